@@ -84,7 +84,7 @@ def ran(folder: Path) -> bool:
 )
 def test_a_file_that_is_data_runs_no_code(sent, read, file):
     named = "model.toml" if file == "through.toml" else file
-    with pytest.raises(CodeRefused, match=rf"{named}.*sent\.py.*--allow-code.*stickslip\.allow_code"):
+    with pytest.raises(CodeRefused, match=rf"{named}.*sent\.py.*stickslip\.allow_code"):
         read(sent / file)
     assert not ran(sent)
 

@@ -17,6 +17,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
+from stickslip.arguments import arguments_checked
 from stickslip.errors import CodeRefused
 
 _allowed: ContextVar[bool | frozenset[str]] = ContextVar("stickslip_code_allowed", default=False)
@@ -25,6 +26,7 @@ _ran: set[str] = set()
 """SHA-256 of what ran in this process."""
 
 
+@arguments_checked
 @contextmanager
 def allow_code(allowed: bool | Collection[str] = True, *, remember: bool = False) -> Generator[None]:
     """Let code that TOML files name run: the laws and rigs of a model, study or rig that somebody sent.

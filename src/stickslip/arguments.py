@@ -1,7 +1,7 @@
-"""Arguments that are numbers: what is none, text such as "0.1" above all, is refused where it is given.
+"""Arguments of a wild kind are refused where they are given: one line with function, argument, value and remedy.
 
-Annotations say which they are: ``float``, ``int``, either with ``| None``, ``tuple[float, float]``, and values of a
-``Mapping[str, float]``. A name in place of a list of names (``Sequence[str]``) is refused too.
+Annotations say what an argument must be (`stickslip.rules`): what is no number, text such as "0.1" above all, no text,
+path, function, list or mapping, no `Model`, or none of the words of a ``Literal`` does not get in.
 """
 
 from __future__ import annotations
@@ -9,17 +9,26 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
+import sys
 from collections.abc import Callable, Mapping
+from itertools import chain, repeat
 from typing import Any, ParamSpec, TypeVar, cast
 
-from stickslip.errors import ParameterError
+from stickslip.errors import ParameterError, StickslipError, UnknownName
+from stickslip.in_python import in_python
+from stickslip.rules import Rule, Wrong, rule_of
 
-NUMBERS = {"float", "int"}
-NAMES = {"Iterable[str]", "Sequence[str]"}
-PAIR, NAMED = "tuple[float, float]", "Mapping[str, float]"
+EXAMPLES = {
+    "leave_out": "[(1, 500), 'spikes']", "loop": "{'kp': 8.0, 'kd': 0.08}", "map": "{'position': 'q_deg:deg'}",
+    "rows": "(2001, 8000)", "units": "{'position': 'deg', 'torque': 'mNm'}", "values": "{'fc': 0.3}",
+}  # fmt: skip
+"""How arguments of several parts are written."""
+SIGNAL = "ArrayLike"
+"""Annotation of what readers look at themselves."""
 
 P = ParamSpec("P")
 R = TypeVar("R")
+T = TypeVar("T")
 
 
 def no_number(owner: str, name: str, value: object, unit: str = "") -> ParameterError:
@@ -34,17 +43,23 @@ def no_number(owner: str, name: str, value: object, unit: str = "") -> Parameter
     unit : str
         Empty where it is not known.
     """
-    shown = repr(value)
+    return refusal(owner, name, Wrong("", value, f"a number{f' in {unit}' if unit else ''}"))
+
+
+def refusal(owner: str, name: str, wrong: Wrong, lists: bool = False) -> ParameterError:
+    """As `no_number`, of anything; `lists`: a list of names would do."""
+    place, value, words = wrong
+    shown = " ".join(repr(value).split())
     shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
-    said = f"{owner}: {name} = {shown} must be a number{f' in {unit}' if unit else ''}"
-    if isinstance(value, str) and says_number(value):
+    said = f"{owner}: {name}{place} = {shown} must be {words}"
+    if isinstance(value, str) and says_number(value) and words.startswith(("a number", "a whole number")):
         said += f"; write it without quotes, {value.strip()}"
+    elif isinstance(value, str) and lists and not place:
+        # Each of its letters would be taken for a name.
+        said += f"; write [{shown}]"
+    elif name in EXAMPLES and not place:
+        said += f", such as {EXAMPLES[name]}"
     return ParameterError(said)
-
-
-def is_number(value: object) -> bool:
-    """Whether it may stand for a number: what has a value as a float, but no text."""
-    return hasattr(value, "__float__") and not isinstance(value, (str, bytes))
 
 
 def says_number(text: str) -> bool:
@@ -56,15 +71,15 @@ def says_number(text: str) -> bool:
     return True
 
 
-def insist_on_numbers(owner: str, annotations: Mapping[str, Any], given: Mapping[str, Any]) -> None:
-    """Refuse what is no number where the annotation says one.
+def insist_on(owner: str, rules: Mapping[str, Rule], given: Mapping[str, Any]) -> None:
+    """Refuse what is not what it must be.
 
     Parameters
     ----------
     owner : str
         As messages call it.
-    annotations : mapping of str to str
-        By name; those that say no number are left alone.
+    rules : mapping of str to Rule
+        By name (`rules_in`); what has none is left alone.
     given : mapping of str to object
 
     Raises
@@ -72,73 +87,179 @@ def insist_on_numbers(owner: str, annotations: Mapping[str, Any], given: Mapping
     ParameterError
     """
     for name, value in given.items():
-        annotation = annotations.get(name)
-        if annotation is not None:
-            _insist(owner, name, str(annotation), value)
+        rule = rules.get(name)
+        if rule is not None and type(value) not in rule.quick:
+            insist(owner, name, rule, value)
+
+
+def insist(owner: str, name: str, rule: Rule, value: Any) -> None:
+    """As `insist_on`, of one."""
+    if (wrong := rule.wrong(value)) is not None:
+        raise refusal(owner, name, wrong, rule.lists)
 
 
 def insist_on_own(thing: object, owner: str) -> None:
-    """As `insist_on_numbers`, of the fields of a dataclass, inherited ones too; NumPy's numbers become Python's."""
-    kind = type(thing)
-    for name, annotation in _fields(kind):
+    """As `insist_on`, of the fields of a dataclass, inherited ones too; NumPy's numbers become Python's."""
+    for name, rule in _fields(type(thing)):
         value = getattr(thing, name)
-        if type(value) is float or type(value) is int:
+        if type(value) in rule.quick:
             continue
-        _insist(owner, name, annotation, value)
-        if not isinstance(value, (int, float)) and _parts(annotation) <= NUMBERS:
+        insist(owner, name, rule, value)
+        if rule.make is float and not isinstance(value, (int, float)):
             # Of less precision, it would make everything that is computed with it so.
             object.__setattr__(thing, name, float(value))
+        elif rule.make is int and value is not None:
+            object.__setattr__(thing, name, int(value))
 
 
-def numbers_checked(function: Callable[P, R]) -> Callable[P, R]:
-    """A function that refuses what is no number where it is annotated as one, under the function's name."""
-    parameters = inspect.signature(function).parameters.values()
-    annotations = {p.name: p.annotation for p in parameters}
-    others = next((p.annotation for p in parameters if p.kind is p.VAR_KEYWORD), None)
-    positional = [p.name for p in parameters if p.kind is p.POSITIONAL_OR_KEYWORD]
-    name = getattr(function, "__name__", "")
+def constructor_checked(kind: type[T]) -> type[T]:
+    """A class, a named tuple's too, whose constructor is `arguments_checked`."""
+    name = "__new__" if tuple in kind.__mro__ else "__init__"
+    setattr(kind, name, arguments_checked(getattr(kind, name), kind.__module__))
+    return kind
+
+
+def arguments_checked(function: Callable[P, R], module: str = "") -> Callable[P, R]:
+    """A function that refuses what its annotations do not allow; its errors speak of arguments, not of options.
+
+    Where a whole number is annotated, 2.0 becomes 2. `module` has the names of the annotations; the function's own, if
+    none is given.
+    """
+    signature = inspect.signature(function)
+    parameters = signature.parameters.values()
+    positional = [p.name for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
+    several = next((p.name for p in parameters if p.kind is p.VAR_POSITIONAL), "")
+    owner = getattr(function, "__qualname__", "").removesuffix(".__init__").removesuffix(".__new__")
+    accepted = functools.cache(lambda: Accepted.by(function, signature, owner, module))
 
     @functools.wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
-        for own, value in (*zip(positional, args), *kwargs.items()):
-            annotation = annotations.get(own, others)
-            if annotation is not None:
-                _insist(name, own, str(annotation), value)
-        return function(*args, **kwargs)
+        takes = accepted()
+        rules = takes.rules
+        made: dict[str | int, int] = {}
+        try:
+            for i, (own, value) in enumerate(zip(chain(positional, repeat(several)), args)):
+                rule = rules.get(own)
+                if rule is not None and type(value) not in rule.quick:
+                    insist(owner, own, rule, value)
+                    if rule.make is int and value is not None:
+                        made[i] = int(cast("Any", value))
+            for own, value in kwargs.items():
+                rule = rules.get(own, takes.others)
+                if rule is not None and type(value) not in rule.quick:
+                    insist(owner, own, rule, value)
+                    if rule.make is int and value is not None:
+                        made[own] = int(cast("Any", value))
+                elif takes.closed and own not in takes.names:
+                    raise UnknownName(f"argument of {owner}", own, takes.listed)
+            if made:
+                call: Any = function
+                return call(
+                    *(made.get(i, x) for i, x in enumerate(args)),
+                    **{n: made.get(n, x) for n, x in kwargs.items()},
+                )
+            return function(*args, **kwargs)
+        except TypeError:
+            takes.refuse_call(signature, args, kwargs)
+            raise
+        except StickslipError as error:
+            words = in_python(str(error), owner, not takes.signals.isdisjoint(kwargs))
+            error.args = (words, *error.args[1:])
+            raise
 
     return checked
 
 
-def _insist(owner: str, name: str, annotation: str, value: Any) -> None:
-    parts = _parts(annotation)
-    if value is None and "None" in parts:
-        return
-    if parts & NUMBERS and (parts <= {"None", *NUMBERS} or (isinstance(value, str) and "str" not in parts)):
-        if not is_number(value):
-            raise no_number(owner, name, value)
-    elif isinstance(value, str) and parts & NAMES and "str" not in parts:
-        # Each of its letters would be taken for a name.
-        raise ParameterError(f"{owner}: {name} = {value!r} must be a list of names; write [{value!r}]")
-    elif NAMED in parts and isinstance(value, Mapping):
-        for key, number in cast("Mapping[str, Any]", value).items():
-            if not is_number(number):
-                raise no_number(owner, f"{name}[{key!r}]", number)
-    elif PAIR in parts and isinstance(value, (tuple, list)):
-        for i, number in enumerate(cast("tuple[Any, ...]", value)):
-            if not is_number(number):
-                raise no_number(owner, f"{name}[{i}]", number)
+@dataclasses.dataclass(frozen=True)
+class Accepted:
+    """What a function takes.
+
+    Attributes
+    ----------
+    owner : str
+        Its name.
+    rules : mapping of str to Rule
+        By argument.
+    others : Rule or None
+        Of arguments under names of the caller's own.
+    names, signals : frozenset of str
+        Every argument; those of them that are signals in arrays.
+    closed : bool
+        Whether there are no others.
+    """
+
+    owner: str
+    rules: Mapping[str, Rule]
+    others: Rule | None
+    names: frozenset[str]
+    signals: frozenset[str]
+    closed: bool
+
+    @classmethod
+    def by(
+        cls, function: Callable[..., Any], signature: inspect.Signature, owner: str, module: str
+    ) -> Accepted:
+        """By a function's annotations; those of a ``**options: Unpack[Options]`` are its own."""
+        said = {n: p.annotation for n, p in signature.parameters.items()}
+        last = next((n for n, p in signature.parameters.items() if p.kind is p.VAR_KEYWORD), "")
+        own: dict[str, Any] = getattr(inspect.unwrap(function), "__globals__", {})
+        scope = vars(sys.modules[module]) if module else own
+        more, rest = "", said.pop(last, "")
+        if str(rest).startswith("Unpack["):
+            options: Any = scope[str(rest)[len("Unpack[") : -1]]
+            scope = {**scope, **vars(sys.modules[options.__module__])}
+            said, last = {**said, **written(options)}, ""
+        elif last:
+            more = rest
+        others = rules_in({last: more}, scope).get(last) if last else None
+        signals = frozenset(n for n, a in said.items() if getattr(a, "__forward_arg__", a) == SIGNAL)
+        return cls(owner, rules_in(said, scope), others, frozenset(said), signals, not last)
+
+    @property
+    def listed(self) -> list[str]:
+        """Names of arguments, without what a method is called on."""
+        return sorted(self.names - {"self", "cls", "_cls"})
+
+    def refuse_call(self, signature: inspect.Signature, args: Any, kwargs: Any) -> None:
+        """Refuse a call without what must be given, or with too much.
+
+        Raises
+        ------
+        ParameterError
+        """
+        try:
+            signature.bind(*args, **kwargs)
+        except TypeError as error:
+            raise ParameterError(
+                f"{self.owner}: {error}; its arguments are {', '.join(self.listed)}"
+            ) from None
+
+
+def written(kind: Any) -> dict[str, Any]:
+    """Annotations of a class itself, as they are written."""
+    return dict(inspect.get_annotations(kind))
+
+
+def rules_in(annotations: Mapping[str, Any], scope: Mapping[str, Any]) -> dict[str, Rule]:
+    """Rules of annotations whose names `scope` has; what type checkers alone import has none."""
+    out: dict[str, Rule] = {}
+    for name, annotation in annotations.items():
+        said: Any = getattr(annotation, "__forward_arg__", annotation)
+        if said in (SIGNAL, inspect.Parameter.empty):
+            continue
+        try:
+            hint = eval(said, dict(scope)) if isinstance(said, str) else said
+        except NameError:
+            continue
+        if (rule := rule_of(hint)) is not None:
+            out[name] = rule
+    return out
 
 
 @functools.cache
-def _fields(kind: type[Any]) -> tuple[tuple[str, str], ...]:
-    """Names and annotations of a dataclass's fields."""
-    of = {
-        name: str(said) for k in reversed(kind.__mro__) for name, said in inspect.get_annotations(k).items()
-    }
-    return tuple((f.name, of[f.name]) for f in dataclasses.fields(kind))
-
-
-@functools.cache
-def _parts(annotation: str) -> set[str]:
-    """What an annotation allows, one by one."""
-    return {part.strip() for part in annotation.split("|")}
+def _fields(kind: type[Any]) -> tuple[tuple[str, Rule], ...]:
+    """Rules of a dataclass's fields that its constructor takes."""
+    rules: dict[str, Rule] = {}
+    for k in reversed(kind.__mro__):
+        rules |= rules_in(written(k), vars(sys.modules[k.__module__]))
+    return tuple((f.name, rules[f.name]) for f in dataclasses.fields(kind) if f.init and f.name in rules)

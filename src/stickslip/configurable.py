@@ -6,9 +6,10 @@ import types
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Self, cast
 
-from stickslip.arguments import is_number, no_number
+from stickslip.arguments import arguments_checked, no_number
 from stickslip.description import Choice, Field, Option, fields_of, packed
 from stickslip.errors import ParameterError, UnknownName, suggestion
+from stickslip.rules import is_number
 
 
 class Described:
@@ -61,7 +62,7 @@ class Described:
         return self._number(f, value, f.name)
 
     def _number(self, f: Field, value: Any, label: str) -> float:
-        if isinstance(value, bool) or not is_number(value):
+        if not is_number(value):
             raise no_number(self.name, label, value, f.par.unit)
         complaint = f.par.complaint(float(value))
         if complaint:
@@ -106,6 +107,18 @@ class Configurable(Described):
                 fields.setdefault(f.name, f)
         return fields
 
+    def try_example(self) -> None:
+        """Refuse parameters of the example that cannot be.
+
+        Raises
+        ------
+        ParameterError
+        """
+        try:
+            self.parameters(dict(self.example))
+        except ParameterError as error:
+            raise ParameterError(f"{error}, in its example") from None
+
     def option_scope(self) -> dict[str, Any]:
         """What the names that choices replace stand for under the chosen options."""
         scope: dict[str, Any] = {}
@@ -133,6 +146,7 @@ class Configurable(Described):
         defaults = {c.name: c.default for c in self.choices}
         return self.chosen.get(choice, defaults.get(choice, ""))
 
+    @arguments_checked
     def having(self, **names: str) -> Self:
         """Return this with other options, ``law.having(slip_rule="literal")``.
 

@@ -36,6 +36,7 @@ from dataclasses import dataclass, field
 from dataclasses import fields as dataclass_fields
 from typing import Annotated, Any, ClassVar, NamedTuple
 
+from stickslip.arguments import insist_on_own
 from stickslip.binding import bound, first_complaint
 from stickslip.errors import LawError
 from stickslip.spec import Choice, Configurable, Field, Law, Par, fields_of
@@ -157,6 +158,7 @@ class ControlLaw(Configurable):
     Parameters: Any = field(init=False)
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "control law")
         if self.place not in PLACES:
             raise LawError(
                 f"control law {self.name!r}: place = {self.place!r} must be one of {', '.join(PLACES)}"
@@ -180,7 +182,7 @@ class ControlLaw(Configurable):
         }
         for name, part in parts.items():
             object.__setattr__(self, name, part)
-        self.parameters(dict(self.example))
+        self.try_example()
 
     def holding(self, name: str, law: Law) -> Callable[..., float]:
         """The function of that name with a friction law's functions in their places, in the chosen options too."""

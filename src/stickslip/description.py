@@ -10,6 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
+from stickslip.arguments import insist_on_own
+from stickslip.errors import LawError
+
 
 @dataclass(frozen=True, slots=True)
 class Par:
@@ -32,6 +35,9 @@ class Par:
     directional: bool = False
     per: str = "element"
     whole: bool = False
+
+    def __post_init__(self) -> None:
+        insist_on_own(self, "Par")
 
     def complaint(self, value: float) -> str:
         """Say what is wrong with `value`, or return the empty string."""
@@ -207,7 +213,7 @@ def fields_of(description: type | None) -> tuple[Field, ...]:
     out: list[Field] = []
     for name, hint in get_type_hints(description, include_extras=True).items():
         if get_origin(hint) is not Annotated:
-            raise TypeError(f"{description.__name__}.{name} needs Annotated[float, Par(...)]")
+            raise LawError(f"{description.__name__}.{name} needs Annotated[float, Par(...)]")
         kind, par = get_args(hint)[:2]
         out.append(Field(name, par, get_origin(kind) is tuple))
     return tuple(out)

@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip import plugins
-from stickslip.arguments import numbers_checked
+from stickslip.arguments import arguments_checked
 from stickslip.config import Table, read_toml
 from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
 from stickslip.spec import Law, ReferenceKind
@@ -51,21 +51,24 @@ class Model:
 
     __slots__ = ("law", "parameters")
 
+    @arguments_checked
     def __init__(self, law: str | Law, choices: Mapping[str, str] | None = None, **parameters: Any) -> None:
         found = plugins.law(law) if isinstance(law, str) else plugins.completed(law)
         self.law: Law = found.having(**choices) if choices else found
         self.parameters: Any = self.law.parameters(parameters)
         if (words := self.law.remark(self.parameters)) and not _called_from_within():
-            warnings.warn(words, ModelRemark, stacklevel=2)
+            warnings.warn(words, ModelRemark, stacklevel=3)
 
+    @arguments_checked
     def warn(self, origin: str = "") -> Model:
         """This model, with a `ModelRemark` where its parameters are allowed but seldom meant; `origin` says where it
         stands."""
         if words := self.law.remark(self.parameters):
-            warnings.warn(f"{origin}: {words}" if origin else words, ModelRemark, stacklevel=3)
+            warnings.warn(f"{origin}: {words}" if origin else words, ModelRemark, stacklevel=4)
         return self
 
     @classmethod
+    @arguments_checked
     def from_file(cls, path: str | os.PathLike[str]) -> Model:
         """Read the law that `stickslip identify` wrote to ``model.toml``, or a person: ``law`` and ``[parameters]``.
 
@@ -77,6 +80,7 @@ class Model:
         return cls.from_table(read_toml(Path(path)))
 
     @classmethod
+    @arguments_checked
     def from_table(cls, table: Table) -> Model:
         """As `from_file`, of the content of a file: a `table` in which the path of a law's file is relative to its
         document's folder."""
@@ -106,6 +110,7 @@ class Model:
             # What an identification found was remarked upon there; nobody mistook one number for another.
             return made if "format" in table.values else made.warn(file)
 
+    @arguments_checked
     def having(self, **choices: str) -> Model:
         """This model under other options of its law; options that the law does not have are left out."""
         known = {c.name for c in self.law.choices}
@@ -113,7 +118,7 @@ class Model:
         same = all(self.law.option_of(n) == o for n, o in wanted.items())
         return self if same else Model(self.law, wanted, **self.parameters._asdict())
 
-    @numbers_checked
+    @arguments_checked
     def scaled(self, **factors: float) -> Model:
         """This model with some parameters multiplied, ``model.scaled(fs=1.1, fc=1.1)``.
 
@@ -146,8 +151,9 @@ class Model:
 def _called_from_within() -> bool:
     """Whether the package itself makes the model: a fit tries many that nobody has written."""
     frame = inspect.currentframe()
-    maker = frame.f_back.f_back if frame and frame.f_back else None
-    return maker is not None and str(maker.f_globals.get("__name__", "")).startswith("stickslip.")
+    for _ in range(3):  # this function, the constructor, what checks its arguments
+        frame = frame.f_back if frame else None
+    return frame is not None and str(frame.f_globals.get("__name__", "")).startswith("stickslip.")
 
 
 def _times(factor: float, value: Any) -> Any:
@@ -177,11 +183,13 @@ class Reference:
 
     __slots__ = ("kind", "parameters")
 
+    @arguments_checked
     def __init__(self, kind: str | ReferenceKind, **parameters: Any) -> None:
         self.kind: ReferenceKind = plugins.reference_kind(kind) if isinstance(kind, str) else kind
         self.parameters: Any = self.kind.parameters(parameters)
 
     @classmethod
+    @arguments_checked
     def table(
         cls, time: Sequence[float], position: Sequence[float], velocity: Sequence[float] | None = None
     ) -> Reference:
@@ -199,6 +207,7 @@ class Reference:
         return cls("table", **{k: [float(x) for x in v] for k, v in
                                (("time", time), ("position", position), ("velocity", velocity))})  # fmt: skip
 
+    @arguments_checked
     def breaks(self, duration: float) -> list[float]:
         """Times inside (0, duration) that integrators step onto, s."""
         per_second = 2.0 * float(getattr(self.parameters, "frequency", 0.0))
@@ -209,6 +218,7 @@ class Reference:
             )
         return sorted(t for t in self.kind.breaks(self.parameters, duration) if 0.0 < t < duration)
 
+    @arguments_checked
     def sample(self, time: Sequence[float] | np.ndarray[Any, Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Position (rad), velocity (rad/s) and acceleration (rad/s²), shape (n, 3), at each `time` (s)."""
         from types import SimpleNamespace

@@ -20,6 +20,7 @@ from types import ModuleType
 from typing import Any
 
 from stickslip import approval, trial
+from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError, LawError, UnknownName
 from stickslip.spec import Law, ReferenceKind
 from stickslip.subset import law_layouts, lower
@@ -31,6 +32,7 @@ def law_names() -> tuple[str, ...]:
     return (*builtin, *installed("stickslip.laws"), *_from_files())
 
 
+@arguments_checked
 def law(name: str, named_by: str = "") -> Law:
     """The law of that name, or of the file of that path.
 
@@ -76,6 +78,7 @@ def reference_names() -> tuple[str, ...]:
     return (*builtin, *installed("stickslip.references"))
 
 
+@arguments_checked
 def reference_kind(name: str) -> ReferenceKind:
     """The kind of reference of that name.
 

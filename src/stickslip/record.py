@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from stickslip.arguments import arguments_checked, insist_on_own
 from stickslip.errors import InputError, suggestion
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ class Record:
     meta: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "record")
         for name, values in self.channels.items():
             if values.shape != self.time.shape:
                 raise InputError(f"channel {name!r} has shape {values.shape}, time has {self.time.shape}")
@@ -52,8 +54,8 @@ class Record:
             return self.time
         try:
             return self.channels[name]
-        except KeyError:
-            raise InputError(f"no channel {name!r}; {suggestion(name, self.channels)}") from None
+        except (KeyError, TypeError):
+            raise InputError(f"no channel {name!r}; {suggestion(str(name), self.channels)}") from None
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -63,6 +65,7 @@ class Record:
         listed = ", ".join(f"{name} [{self.units[name]}]" for name in self.channels)
         return f"<Record: {len(self)} rows{span}; {listed}>"
 
+    @arguments_checked
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the record as .npz: arrays, and units and meta as JSON (no pickle). Returns the path."""
         target = Path(path)
@@ -75,6 +78,7 @@ class Record:
         return target
 
     @classmethod
+    @arguments_checked
     def load(cls, path: str | os.PathLike[str]) -> Record:
         """Read the record that `save` wrote to `path`, or the stream of a rig (`stickslip.stream`).
 

@@ -41,6 +41,7 @@ from dataclasses import dataclass, field
 from dataclasses import fields as dataclass_fields
 from typing import Any, ClassVar
 
+from stickslip.arguments import insist_on_own
 from stickslip.binding import bound, distinct, first_complaint, least, wrapped
 from stickslip.configurable import Configurable, Described
 from stickslip.description import (
@@ -112,6 +113,7 @@ class ReferenceKind(Described):
     Parameters: Any = field(init=False)
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "reference")
         object.__setattr__(self, "fields", fields_of(self.Params))
         object.__setattr__(self, "Parameters", self.Params)
 
@@ -185,6 +187,7 @@ class Law(Configurable):
     """Laws made from this one by `having`; shared with them, so that each exists (and is compiled) once."""
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "law")
         written = {f.name: getattr(self, f.name) for f in dataclass_fields(self) if f.init}
         chosen = [self.option(choice) for choice in self.choices]
         fields = self.option_fields(self.Params)
@@ -214,7 +217,7 @@ class Law(Configurable):
             parts["odd"] = False
         for name, part in parts.items():
             object.__setattr__(self, name, part)
-        self.parameters(dict(self.example))
+        self.try_example()
 
     written: Mapping[str, Any] = field(init=False, repr=False)
     """What the law's file says, before any option changed it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import tomllib
 from pathlib import Path
@@ -13,7 +14,9 @@ import pytest
 import tomli_w
 
 from stickslip.cli import main
+from stickslip.identify.compare import text
 from stickslip.identify.compare.change import compare_models
+from stickslip.identify.compare.levels import Change
 from stickslip.identify.identified_file import read_identified
 from stickslip.report.identification import panel_of
 from support.identified_files import STRIBECK, written
@@ -101,3 +104,22 @@ def test_models_of_different_laws_are_compared_by_their_curves(
     shown = capsys.readouterr().out
     assert "only the curves" in shown
     assert "p (Holm)" not in shown
+
+
+def test_a_change_of_what_is_near_zero_is_told_in_its_unit() -> None:
+    """An offset of 0.1 mN·m that came out as 3.5 "changed by +3400 %", its interval from -3 to +10 thousand."""
+    offset = Change("offset", "N·m", 1e-4, 3.5e-3, -3e-3, 9.8e-3, 0.3)
+    assert math.isnan(offset.percent)
+    assert offset.words() == "offset +0.0034 N·m [-0.003, +0.0098]"
+    assert Change("fc", "N·m", 0.3, 0.36, 0.05, 0.07, 0.0).words() == "fc +20 % [+17, +23]"
+
+
+def test_columns_of_a_comparison_never_touch() -> None:
+    long = Change("friction at -0.000315 rad/s", "N·m·(s/rad)^δ", -1.2346e-5, -1.2346e-15, -1e-4, 1e-4, 0.5)
+    every = [long, Change("fc", "N·m", 0.3, 0.36, 0.05, 0.07, 0.0)]
+    widths = text.widths_of(every)
+    for change in every:
+        cells = text.cells(change)
+        line = text.row(cells, widths)
+        assert [c for c in re.split(r"\s{1,}", line) if c] == " ".join(cells).split()
+        assert len(line) == len(text.row(("parameter", *text.HEAD), widths))

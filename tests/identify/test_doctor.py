@@ -154,7 +154,7 @@ def test_raise_for_errors_names_the_first():
     record = Record(table["time"], {"position": table["position"], "motor_torque": -table["torque"]},
                     {"position": "rad", "motor_torque": "N·m"})  # fmt: skip
     with pytest.raises(
-        InputError, match=r"log.csv: friction would drive the axis.*--map 'motor_torque=motor_torque:-N·m'"
+        InputError, match=r'log.csv: friction would drive the axis.*map={"motor_torque": "motor_torque:-N·m"}'
     ):
         examine(record).raise_for_errors("log.csv")
 

@@ -223,7 +223,7 @@ def test_loads_that_reach_the_curve_together_while_the_axis_hardly_moves_let_tim
         torque_limit=1.0,
     )
     axis, slow = (
-        ss.RigidAxis(J, GMS.having(fs=1.3 * FS, fc=1.3 * FC)),
+        ss.RigidAxis(J, GMS),
         ss.Reference("sine", amplitude=0.01, frequency=0.4),
     )
     outcome = sampled.run(prepare(axis, controller, slow, 1.3, metered=False))

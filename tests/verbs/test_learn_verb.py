@@ -119,7 +119,7 @@ def test_what_cannot_be_repeated_is_refused():
         ({"duration": 0.50001}, "whole number of samples"),
         ({"repetitions": 0}, "repetitions = 0"),
         ({"over": "angle", "corner": 20.0}, "belong to learning over time"),
-        ({"over": "speed"}, "unknown domain of learning 'speed'"),
+        ({"over": "speed"}, "over = 'speed' must be 'time' or 'angle'"),
         ({"controller": ROWS["PD + FF LuGre .9 + DOB 400 whole (wrong)"]}, "cancels every feedforward"),
         ({"controller": ss.Controller(ss.pd(6.0, 0.1))}, "continuous time"),
     ):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -249,9 +250,10 @@ def test_a_recommendation_is_that_of_the_command_line_and_runs_in_a_simulation(
 
 @pytest.mark.parametrize("given", [5, None, ss.Model("coulomb", fc=0.1)])
 def test_what_is_no_model_is_said_by_kind(given: Any) -> None:
-    with pytest.raises(ss.InputError, match=rf"a model .* is wanted, not a {type(given).__name__}"):
+    wanted = rf"= {re.escape(repr(given))} must be a path, an IdentificationResult or an Identified"
+    with pytest.raises(ss.InputError, match=f"recommend: model {wanted}"):
         ss.recommend(given)
-    with pytest.raises(ss.InputError, match=rf"is wanted, not a {type(given).__name__}"):
+    with pytest.raises(ss.InputError, match=f"compare: first {wanted}"):
         ss.compare(given, given)
 
 
@@ -261,14 +263,14 @@ def test_what_a_run_is_not_made_of_is_said_by_kind() -> None:
     slow, run = ss.Reference("sine", amplitude=0.1, frequency=1.0), ss.Controller(gains)
     time = np.linspace(0.0, 1.0, 1000)
     for wrong, words in (
-        ((axis, gains, slow, 1.0), r"controller is a Gains; give a Controller"),
-        ((axis, slow, run, 1.0), r"controller is a Reference; give"),
+        ((axis, gains, slow, 1.0), r"controller = Gains\(.* must be a Controller: of gains"),
+        ((axis, slow, run, 1.0), r"controller = Reference\(.* must be"),
         (
             (axis, run, (time, time), 1.0),
-            r"reference is a tuple; give a Reference, of arrays Reference\.table",
+            r"reference = \(array.* must be a Reference, of arrays Reference\.table",
         ),
         ((axis, run, slow, "1"), r"duration = '1' must be a number"),
-        ((1e-3, run, slow, 1.0), r"axis is a float; give a RigidAxis, or a Machine"),
+        ((1e-3, run, slow, 1.0), r"axis = 0.001 must be a RigidAxis or a Machine"),
     ):
         with pytest.raises(ss.InputError, match=words):
             ss.simulate(*wrong)
@@ -306,7 +308,7 @@ def test_a_controller_is_exported_from_memory_and_what_a_target_lacks_is_refused
     assert "loop_kp" in str(alone.files["axis1.st"])
     with pytest.raises(ss.InputError, match="continuous time"):
         ss.export(ss.Controller(pd), to="c99")
-    with pytest.raises(ss.InputError, match="belongs to --compensator"):
+    with pytest.raises(ss.InputError, match="gain belongs to compensator; give"):
         ss.export(lugre, to="c99", gain=0.9)
     with pytest.raises(ss.InputError, match="supports the law alone"):
         ss.export(lugre, to="urdf", compensator="ff")

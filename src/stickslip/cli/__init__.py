@@ -19,6 +19,7 @@ from typing import Any, NoReturn
 from stickslip import compiling, waiting
 from stickslip.approval import allow_code
 from stickslip.errors import InputError, Interrupted, ModelRemark, StickslipError
+from stickslip.in_python import with_options
 from stickslip.verbs.kinds import require
 
 VERBS = (
@@ -78,7 +79,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         compiling.listen(notice)
         waiting.listen(_tell)
     try:
-        return _dispatch(list(sys.argv[1:] if argv is None else argv))
+        with with_options():
+            return _dispatch(list(sys.argv[1:] if argv is None else argv))
     except InputError as error:
         return _complain(error, 2)
     except Interrupted as error:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+from stickslip.arguments import arguments_checked
 from stickslip.control.registry import control_law
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import ParameterError
@@ -41,6 +42,7 @@ class ControlBlock:
 
     __slots__ = ("friction", "law", "parameters")
 
+    @arguments_checked
     def __init__(
         self,
         law: str | ControlLaw,
@@ -88,9 +90,10 @@ class ControlBlock:
             setattr(z, HELD, self.friction.law.state(self.friction.parameters))
         return z
 
+    @arguments_checked
     def function(self, name: str) -> Any:
         """The law's function of that name with the friction law in its place; None where it has none."""
-        own = getattr(self.law, name)
+        own = getattr(self.law, name, None)
         return self.law.holding(name, self.friction.law) if own and self.friction else own
 
     @property
@@ -98,6 +101,7 @@ class ControlBlock:
         """The law's own parameters by name."""
         return {f.name: getattr(self.parameters, f.name) for f in self.law.fields}
 
+    @arguments_checked
     def with_values(self, values: Mapping[str, Any], friction: Mapping[str, Any]) -> ControlBlock:
         """The block with other `values` of its own parameters, and of those of the `friction` law that it holds."""
         held = self.friction
@@ -105,6 +109,7 @@ class ControlBlock:
             held = Model(held.law, **{**held.parameters._asdict(), **friction})
         return ControlBlock(self.law, held, **{**self.own, **values})
 
+    @arguments_checked
     def holding(self, change: Callable[[Model], Model]) -> ControlBlock:
         """The block whose friction law is what `change` makes of it."""
         return ControlBlock(self.law, change(self.friction), **self.own) if self.friction else self

@@ -58,12 +58,6 @@ class Compensator:
     velocity: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
-        given: Any = self.model
-        if not isinstance(given, Model):
-            raise ParameterError(
-                f"{self.name}: model is of kind {type(given).__name__}; give a Model, such as the .model of an "
-                "identification"
-            )
         insist_on_own(self, self.name)
         if not (self.gain >= 0.0 and math.isfinite(self.gain)):
             raise ParameterError(

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
+from stickslip.arguments import arguments_checked
 from stickslip.control.block import ControlBlock, fields_in, state_fields_in, within
 from stickslip.control.calls import calls_of, deviations_of
 from stickslip.control.composition import MEMORY, Settings, functions_with
@@ -105,6 +106,7 @@ class Composed:
         """Parameters of the laws, each law's a part: ``p.loop.kp``."""
         return SimpleNamespace(**{part: block.parameters for part, block in self.blocks.items()})
 
+    @arguments_checked
     def state(self, learned: Mapping[str, Any] | None = None) -> SimpleNamespace:
         """The state of the laws at the start, with what they have `learned` before (as the method `learned` gives it).
 
@@ -134,6 +136,7 @@ class Composed:
             setattr(owner, last, [float(x) for x in numbers] if isinstance(value, list) else float(value))
         return z
 
+    @arguments_checked
     def learned(self, z: SimpleNamespace) -> dict[str, Any]:
         """What its laws have learned in the state `z`, by whole names: to be kept with the power off; plain data."""
         found = {name: _at(z, path) for name, path in self._learned().items()}
@@ -157,6 +160,7 @@ class Composed:
         """The parameters as the flat list that compiled functions read."""
         return packed(self.fields, SimpleNamespace(**self.values()))
 
+    @arguments_checked
     def packed_state(self, z: SimpleNamespace | None = None) -> list[float]:
         """The state `z` (that at the start, if none is given) as the flat list that compiled functions read."""
         z = self.state() if z is None else z
@@ -167,6 +171,7 @@ class Composed:
                 flat.extend(value)
         return flat
 
+    @arguments_checked
     def unpacked_state(self, flat: Sequence[float]) -> SimpleNamespace:
         """The state of the laws that `packed_state` made this flat list of."""
         z, numbers = self.state(), iter(flat)

@@ -6,9 +6,9 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, cast
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import arguments_checked, insist_on_own
 from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Compensator
 from stickslip.control.composed import Composed
@@ -126,7 +126,9 @@ class Controller(Composed):
             if getattr(self, one) and getattr(self, other):
                 raise ParameterError(f"controller: {one} and {other} exclude each other; give one of them")
         if not self.blocks.keys() - {"estimator"}:
-            raise ParameterError("controller: no control law; give a loop, a feedforward or an observer")
+            raise ParameterError(
+                "controller: no control law; give gains, a loop, a feedforward or an observer"
+            )
         laws = [block.law for place in PLACES for block in self._given(place)]
         adapting = next((law.name for law in laws if law.adapts), "")
         integrates = self.linear.ki > 0.0 or any(law.integrates for law in laws)
@@ -173,6 +175,7 @@ class Controller(Composed):
                 out[place if i == 1 else f"{place}_{i}"] = block
         return out
 
+    @arguments_checked
     def with_blocks(self, blocks: Iterable[ControlBlock]) -> Controller:
         """The controller that is made of the laws `blocks`, each at its own place."""
         own = [*blocks]
@@ -213,6 +216,7 @@ class Controller(Composed):
         """Whether a friction law in it acts on what is measured."""
         return any(b.law.place == "observer" and b.friction for b in self.blocks.values())
 
+    @arguments_checked
     def holding(self, change: Callable[[Model], Model]) -> Controller:
         """The controller whose friction laws are what `change` makes of them."""
         own = {place: [b.holding(change) for b in self._given(place)] for place in MANY}
@@ -224,6 +228,7 @@ class Controller(Composed):
         """Its numbers by the names that studies and records know: of the short form its gains, else `values`."""
         return dict(self.gains._asdict()) if self.is_short and self.gains else self.values()
 
+    @arguments_checked
     def with_values(self, values: Mapping[str, Any]) -> Controller:
         """The controller with other `values` of parameters, by whole names (``loop_kp``, ``feedforward_friction_fc``).
 
@@ -239,6 +244,7 @@ class Controller(Composed):
                 (own if len(path) == 2 else held)[path[0]][path[-1]] = values[f.name]
         return self.with_blocks(b.with_values(own[part], held[part]) for part, b in self.blocks.items())
 
+    @arguments_checked
     def with_numbers(self, numbers: Mapping[str, Any]) -> Controller:
         """The controller with others of its `numbers`."""
         if not (self.is_short and self.gains):
@@ -263,7 +269,7 @@ class Controller(Composed):
 
 
 def _listed(blocks: Blocks) -> tuple[ControlBlock, ...]:
-    """None, one or several."""
+    """None, one or several; what is neither counts as one."""
     if blocks is None:
         return ()
-    return (blocks,) if isinstance(blocks, ControlBlock) else tuple(blocks)
+    return tuple(blocks) if isinstance(blocks, (list, tuple)) else (cast("ControlBlock", blocks),)

@@ -12,11 +12,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from stickslip.arguments import numbers_checked
+from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.errors import ParameterError
 from stickslip.spec import Par
 
 
+@constructor_checked
 class Gains(NamedTuple):
     """Gains of the linear controller."""
 
@@ -30,6 +31,7 @@ class Gains(NamedTuple):
     ] = 0.0
 
 
+@constructor_checked
 class Cascade(NamedTuple):
     """Position P around velocity PI, as drives have it; only with a sample time.
 
@@ -68,25 +70,25 @@ class Compensation(NamedTuple):
     """Of a second-order Butterworth low-pass on the velocity, rad/s; 0 for none"""
 
 
-@numbers_checked
+@arguments_checked
 def pr(kp: float, kd: float) -> Gains:
     """Proportional with rate feedback: kp (N·m/rad) on the error, kd (N·m·s/rad) on the velocity; thesis eq. 3.4."""
     return Gains(kp=kp, kd=kd)
 
 
-@numbers_checked
+@arguments_checked
 def pd(kp: float, kd: float) -> Gains:
     """Proportional with derivative: kp (N·m/rad) and kd (N·m·s/rad) on the error; thesis eq. 3.5."""
     return Gains(kp=kp, kd=kd, kr=kd)
 
 
-@numbers_checked
+@arguments_checked
 def pid(kp: float, ki: float, kd: float) -> Gains:
     """Proportional, integral, derivative: kp (N·m/rad), ki (N·m/(rad·s)), kd (N·m·s/rad); thesis eq. 3.11."""
     return Gains(kp=kp, ki=ki, kd=kd, kr=kd)
 
 
-@numbers_checked
+@arguments_checked
 def place(kind: str, inertia: float, bandwidth: float, damping: float = 1.0) -> Gains:
     """Gains that place the poles of the loop without friction; thesis eqs. 3.10 and 3.15.
 

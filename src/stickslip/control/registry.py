@@ -11,6 +11,7 @@ import importlib
 from pathlib import Path
 
 from stickslip import plugins
+from stickslip.arguments import arguments_checked
 from stickslip.config import Table
 from stickslip.control.estimators import ESTIMATORS
 from stickslip.control.laws import CONTROL_LAWS
@@ -28,6 +29,7 @@ def control_law_names() -> tuple[str, ...]:
     return (*builtin, *plugins.installed("stickslip.control_laws"))
 
 
+@arguments_checked
 def control_law(name: str, named_by: str = "") -> ControlLaw:
     """The control law or velocity estimator of that name, or of the file of that path; `named_by` as in `law`.
 

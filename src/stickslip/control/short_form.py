@@ -7,11 +7,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from stickslip.arguments import is_number, no_number
+from stickslip.arguments import no_number
 from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Compensator
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import ParameterError
+from stickslip.rules import is_number
 
 FILTER_ROOM = 0.495  # of the sample rate: just below half of it, where a sampled low-pass ends
 
@@ -22,20 +23,12 @@ def highest_corner(sample_time: float) -> float:
 
 
 def refuse_short(gains: Any, compensator: Any, velocity_filter: float, sample_time: float) -> None:
-    """Refuse what is no such thing, numbers out of bounds, and what acts on samples where there are none.
+    """Refuse numbers out of bounds, and what acts on samples where there are none.
 
     Raises
     ------
     ParameterError
     """
-    if not isinstance(gains, (Gains, Cascade, type(None))):
-        raise ParameterError(
-            f"controller: gains = {gains!r} are none; give a control law by its place, loop=..."
-        )
-    if not isinstance(compensator, (Compensator, type(None))):
-        raise ParameterError(
-            f"controller: compensator = {compensator!r} is none; give Feedforward(...) or Feedback(...)"
-        )
     for name, value in gains._asdict().items() if gains else ():
         if not is_number(value):
             raise no_number("controller", name, value, "")

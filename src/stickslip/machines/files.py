@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from stickslip import plugins
+from stickslip.arguments import arguments_checked
 from stickslip.config import Table, read_toml
 from stickslip.errors import ConfigError, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
@@ -45,6 +46,7 @@ def machine(name: str | os.PathLike[str]) -> Machine:
     raise UnknownName("machine", text, library())
 
 
+@arguments_checked
 def load_machine(name: str | os.PathLike[str]) -> Machine:
     """The machine of that name (`library`), or of the TOML file at that path.
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import arguments_checked, insist_on_own
 from stickslip.errors import ParameterError, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
@@ -168,6 +168,7 @@ class Machine:
         bearings = self.contact.bearings
         return LinearContact(bearings.stiffness if bearings.coulomb > 0.0 else 0.0, bearings.viscous)
 
+    @arguments_checked
     def linear(self, contact: LinearContact = FREE, bearings: LinearContact | None = None) -> Drivetrain:
         """This machine as a linear system: inertias, springs, current loop and encoder, without noise and delay.
 
@@ -198,6 +199,7 @@ class Machine:
             bearings=bearings or LinearContact(0.0, self.contact.bearings.viscous),
         )
 
+    @arguments_checked
     def without(self, *names: str) -> Machine:
         """This machine with imperfections switched off.
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
-from stickslip.arguments import insist_on_own, no_number
+from stickslip.arguments import insist_on_own
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
@@ -33,13 +32,6 @@ class RigidAxis:
     temperature: float = 20.0
 
     def __post_init__(self) -> None:
-        given: Any = self.friction
-        if not isinstance(given, Model):
-            raise ParameterError(
-                f"axis: friction is of kind {type(given).__name__}; give a Model, such as Model('coulomb', fc=0.3)"
-            )
-        if isinstance(self.inertia, bool):
-            raise no_number("axis", "inertia", self.inertia, "kg·m²")
         insist_on_own(self, "axis")
         if not math.isfinite(self.inertia) or self.inertia <= 0.0:
             raise ParameterError(f"axis: inertia = {self.inertia:g} kg·m² must be greater than 0")

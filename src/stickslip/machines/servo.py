@@ -10,8 +10,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from stickslip.arguments import is_number, no_number
+from stickslip.arguments import no_number
 from stickslip.errors import ParameterError
+from stickslip.rules import is_number
 
 SIDES = ("motor", "load")
 GRAVITIES = ("constant", "pendulum")
@@ -22,7 +23,7 @@ DRIVE_QUANTITIES = ("torque", "current", "rated_torque", "voltage")
 
 def positive(owner: str, name: str, value: Any, unit: str) -> None:
     """Refuse what is not a positive number."""
-    if isinstance(value, bool) or not is_number(value):
+    if not is_number(value):
         raise no_number(owner, name, value, unit)
     if not (value > 0.0 and math.isfinite(value)):
         raise ParameterError(f"{owner}: {name} = {value:g} {unit} must be greater than 0")

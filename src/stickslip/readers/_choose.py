@@ -14,6 +14,8 @@ from stickslip.readers.table_columns import Column, Table
 
 MAIN = ("time", "position", "velocity", "motor_torque")
 """Channels that must not be guessed between equals: the wrong one spoils every result."""
+AMBIGUOUS = {"grad": "is a degree in German and a gradian in English; say deg, or 0.9 deg for gradians"}
+"""Units that a file may have, and nobody should say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,9 +123,10 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
             f"--map {role}={text}: the file has no column {name!r}; {suggestion(name, _names_of(table))}"
         )
     if unit:
-        parsed = parse_unit(unit)
+        parsed = None if unit.lower() in AMBIGUOUS else parse_unit(unit)
         if parsed is None or parsed.kind not in KINDS[role]:
             what = "is not a unit that is known" if parsed is None else f"is a unit of {parsed.kind}"
+            what = AMBIGUOUS.get(unit.lower(), what)
             current = role == "motor_torque" and parsed is not None and parsed.kind in ("current", "voltage")
             remedy = (
                 "map it as current and give --torque-constant"

@@ -115,7 +115,7 @@ def times_of(table: Table, choices: Sequence[Choice], sample_time: float | None)
 
 
 def _some(table: Table) -> str:
-    names = [c.name for c in table.columns]
+    names = [c.name or "one without a name" for c in table.columns]
     return ", ".join(names[:12]) + (", ..." if len(names) > 12 else "") if names else "none at all"
 
 

@@ -57,6 +57,15 @@ class Cut:
         if not self.start < self.end:
             raise InputError(f"--from {self.start:g} s must lie before --to {self.end:g} s")
 
+    @property
+    def words(self) -> str:
+        """The options that say it."""
+        said = {
+            "--from": self.start != -math.inf, "--to": self.end != math.inf,
+            "--rows": self.rows != (1, math.inf), "--leave-out": bool(self.leave_out),
+        }  # fmt: skip
+        return ", ".join(option for option, given in said.items() if given)
+
 
 def parse_rows(option: str, text: str) -> tuple[float, float]:
     """Read ``A:B``, ``A:``, ``:B`` or ``A``: rows from 1, both ends included.
@@ -103,7 +112,7 @@ def cut(record: Record, asked: Cut) -> Record:
         known = record.time[np.isfinite(record.time)]
         span = f" from t = {known[0]:.6g} to {known[-1]:.6g} s" if known.size else ""
         raise InputError(
-            f"{left} of {count} rows are left, too few to look at; the record has rows 1:{count}{span}"
+            f"{left} of {count} rows are left by {asked.words}, too few to look at; the record has rows 1:{count}{span}"
         )
     return record if left == count else taken(record, keep)
 

@@ -14,11 +14,14 @@ from stickslip.readers._names import ALIASES, KINDS
 from stickslip.readers._units import SI, parse_unit
 from stickslip.readers.convert import LINEAR
 from stickslip.readers.table_columns import Column, Table
+from stickslip.rules import with_article
 
 FORMAT = "arrays"
 
 
-def table_of_signals(signals: Mapping[str, Any], units: Mapping[str, str]) -> tuple[Table, dict[str, str]]:
+def table_of_signals(
+    signals: Mapping[str, Any], units: Mapping[str, str], arguments: Mapping[str, str]
+) -> tuple[Table, dict[str, str]]:
     """A column for every signal, and the mapping that says which channel it is.
 
     Parameters
@@ -27,6 +30,8 @@ def table_of_signals(signals: Mapping[str, Any], units: Mapping[str, str]) -> tu
         By channel, or its short name (torque, reference, ...).
     units : mapping of str to str
         By the same names; SI where one has none, of a linear axis (m, N) where another is.
+    arguments : mapping of str to str
+        What messages call a signal, where that is not its name.
 
     Raises
     ------
@@ -35,20 +40,22 @@ def table_of_signals(signals: Mapping[str, Any], units: Mapping[str, str]) -> tu
     """
     columns: list[Column] = []
     for name, values in signals.items():
+        said = arguments.get(name, name)
         try:
             numbers = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError):
-            raise InputError(f"{name} is no array of numbers; give one number a sample") from None
+            raise InputError(f"{said} is no array of numbers; give one number a sample") from None
         if numbers.ndim != 1:
-            raise InputError(f"{name} has shape {numbers.shape}; give one number a sample, shape (n,)")
+            raise InputError(f"{said} has shape {numbers.shape}; give one number a sample, shape (n,)")
         columns.append(Column(name, numbers))
     lengths = {c.name: c.values.size for c in columns}
     if len(set(lengths.values())) > 1:
-        listed = ", ".join(f"{name} {size}" for name, size in lengths.items())
+        listed = ", ".join(f"{arguments.get(name, name)} {size}" for name, size in lengths.items())
         raise InputError(f"the arrays differ in length ({listed}); give one number a sample in each")
+    listed = ", ".join(arguments.get(name, name) for name in signals)
     for name in units:
         if name not in signals:
-            raise InputError(f"units names {name!r}, which is none of {', '.join(signals) or 'no arrays'}")
+            raise InputError(f"units names {arguments.get(name, name)!r}, which is none of {listed}")
     stated = [parse_unit(unit) for unit in units.values()]
     linear = any(unit is not None and unit.kind in LINEAR.values() for unit in stated)
     channels: dict[str, str] = {}
@@ -79,8 +86,8 @@ def table_in_memory(data: Any) -> Table:
     table = table_of(FORMAT, tree)
     if not table.columns:
         raise InputError(
-            f"a {type(data).__name__} without columns of numbers is no log; give a path, a data frame, a mapping of "
-            "arrays, a Record, or arrays by name (t=..., position=..., torque=...)"
+            f"log: {with_article(type(data).__name__)} without columns of numbers is no log; give a path, a data "
+            "frame, a mapping of arrays, a Record, or arrays by name (t=..., position=..., torque=...)"
         )
     return table
 

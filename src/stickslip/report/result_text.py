@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.in_python import in_python
 from stickslip.report.answers import Answers, meaning_of, one_number_each
 
 JUDGED = (
@@ -26,7 +27,7 @@ def result_lines_in_python(found: Identification, answers: Answers) -> list[str]
         else f"next, in a shell: {s.command}" if s.command
         else f"measure next: {s.what}" for s in answers.steps
     ]  # fmt: skip
-    return [*numbers_and_trust(found, answers), *steps]
+    return [*(in_python(line, "identify") for line in numbers_and_trust(found, answers)), *steps]
 
 
 def numbers_and_trust(found: Identification, answers: Answers) -> list[str]:

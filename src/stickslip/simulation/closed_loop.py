@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import stickslip
-from stickslip.arguments import numbers_checked
+from stickslip.arguments import arguments_checked
 from stickslip.capacity import insist_on_memory
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
@@ -50,13 +50,6 @@ ON_A_MACHINE = 100.0
 SHORTEST = 1e-9
 """s, of a run: one-sided limits are taken a thousandth of it beside kinks and ends."""
 
-KINDS: tuple[tuple[str, tuple[type, ...], str], ...] = (
-    ("axis", (RigidAxis, Machine), "a RigidAxis, or a Machine as load_machine makes it"),
-    ("controller", (Controller,), "a Controller: of gains, Controller(place('PD', ...)), or of control laws"),
-    ("reference", (Reference,), "a Reference, of arrays Reference.table(time, position)"),
-)
-"""Arguments of `simulate`: what they must be, and what to give."""
-
 REASONS: dict[int, tuple[type[SimulationError], str]] = {
     case_arrays.DIVERGED: (Divergence, "position or velocity left every reasonable bound"),
     case_arrays.NOT_FINITE: (Divergence, "the state is no longer a number"),
@@ -78,7 +71,7 @@ REASONS: dict[int, tuple[type[SimulationError], str]] = {
 }
 
 
-@numbers_checked
+@arguments_checked
 def simulate(
     axis: RigidAxis | Machine,
     controller: Controller,
@@ -146,7 +139,6 @@ def simulate(
         If the run diverges, leaves the finite numbers or switches without end; it says when and why, and its
         ``record`` holds what was computed.
     """
-    _insist_on_kinds(axis, controller, reference)
     _insist_on_tolerance(tolerance)
     if isinstance(axis, Machine):
         check_machine_run(
@@ -163,13 +155,6 @@ def simulate(
         tolerance=tolerance, slip_rule=slip_rule, output=output, initial=initial, metered=metered,
     )  # fmt: skip
     return run_case(case, integrator, time_step, slip_rule, check=check)
-
-
-def _insist_on_kinds(*given: Any) -> None:
-    """Refuse an argument of another kind than it must be of, such as gains in a controller's place."""
-    for value, (name, kinds, what) in zip(given, KINDS, strict=True):
-        if not isinstance(value, kinds):
-            raise InputError(f"{name} is a {type(value).__name__}; give {what}")
 
 
 def run_case(

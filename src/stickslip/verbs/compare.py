@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from stickslip.arguments import numbers_checked
+from stickslip.arguments import arguments_checked
 from stickslip.identify.compare.change import Comparison, compare_models
 from stickslip.identify.identified_file import Identified, read_identified
 from stickslip.verbs.identification import IdentificationResult
@@ -30,7 +30,7 @@ def identified_of(given: IdentifiedModel) -> Identified:
     return read_identified(given)
 
 
-@numbers_checked
+@arguments_checked
 def compare(first: IdentifiedModel, second: IdentifiedModel, *, top: float | None = None) -> Comparison:
     """Test the difference of two identified models, parameters and sliding curve, at a level of 5 % together.
 

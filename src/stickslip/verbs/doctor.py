@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Unpack
 
-from stickslip.arguments import numbers_checked
+from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import Diagnosis, examine
@@ -14,7 +14,7 @@ from stickslip.readers.cut import file_rows, pieces, range_words
 from stickslip.verbs.reading import Log, Reading, open_log
 
 
-@numbers_checked
+@arguments_checked
 def doctor(
     log: Log | None = None,
     *,

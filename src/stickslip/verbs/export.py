@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from stickslip.arguments import numbers_checked
+from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.config import Document, Table, read_toml
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
@@ -25,6 +25,7 @@ from stickslip.export.target import Target, settings_of
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
+from stickslip.rules import with_article
 from stickslip.spec import Surroundings
 from stickslip.study.files import prepared_folder, unwritable
 from stickslip.study.study import load_run
@@ -44,6 +45,7 @@ NUMBERS = ("gain", "lead", "deadband", "offset", "inertia_feedforward", "filter_
 """Of a compensator: what "ff" or "fb" is given, and a recommendation sets."""
 
 
+@constructor_checked
 @dataclass(frozen=True, eq=False, repr=False)
 class ExportResult:
     """Files for another machine or simulator.
@@ -70,6 +72,7 @@ class ExportResult:
     check: Check | None = None
     paths: tuple[Path, ...] = ()
 
+    @arguments_checked
     def save(self, folder: str | os.PathLike[str]) -> ExportResult:
         """Write the files.
 
@@ -122,7 +125,7 @@ class CompensatorOptions:
         return [f.name for f in fields(self) if getattr(self, f.name) is not None]
 
 
-@numbers_checked
+@arguments_checked
 def export(
     source: Source,
     to: str,
@@ -320,7 +323,7 @@ def controller_in(source: Source) -> Controller:
         return source.controller
     if isinstance(source, (Model, IdentificationResult, PositionMap)):
         raise InputError(
-            f"a {type(source).__name__} has no controller; give a Controller, or leave controller out"
+            f"{with_article(type(source).__name__)} has no controller; give a Controller, or leave controller out"
         )
     whole = read_toml(Path(source))
     if whole.has("controller") and not whole.has("reference"):
@@ -357,8 +360,6 @@ def compensator_of(content: Table, model: Model, options: CompensatorOptions, co
     if compensator == "recommended":
         return recommended_on(content, model, options)
     kinds = {"ff": Feedforward, "fb": Feedback}
-    if compensator not in kinds:
-        raise InputError(f"--compensator {compensator} is not known; choose from ff, fb, recommended")
     axis = axis_of(content)
     known: dict[str, Any] = {
         "offset": axis.get("offset", 0.0), "inertia_feedforward": axis.get("inertia", 0.0)

@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from stickslip.approval import allow_code
+from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.config import Table
 from stickslip.errors import InputError
 from stickslip.finding import Finding
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     import pandas
 
 
+@constructor_checked
 @dataclass(frozen=True, eq=False, repr=False)
 class IdentificationResult:
     """Numbers with intervals, a verdict on each, a model; printed, it is what `stickslip identify` prints.
@@ -137,6 +139,7 @@ class IdentificationResult:
 
         return pictures_of(self.identification, speeds_in([s.record for s in self.sources if not s.held_out]))
 
+    @arguments_checked
     def answers_with(self, model_file: str | os.PathLike[str]) -> Answers:
         """The same, its commands for a model that lies in `model_file`."""
         fitted = [s for s in self.sources if not s.held_out]
@@ -147,6 +150,7 @@ class IdentificationResult:
 
     # ---- files ----------------------------------------------------------------------------------------------------
 
+    @arguments_checked
     def save(self, path: str | os.PathLike[str] = "model.toml") -> Path:
         """Write the model with axis, intervals, correlation and data, as `recommend`, `export` and `compare` take it.
 
@@ -167,6 +171,7 @@ class IdentificationResult:
             target, self.identification, data=self._data, law=self.law_file, more=self._recorded()
         )
 
+    @arguments_checked
     def report(
         self, path: str | os.PathLike[str] = "report.html", model_file: str | os.PathLike[str] | None = None
     ) -> Path:

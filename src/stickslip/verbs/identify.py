@@ -11,7 +11,7 @@ from typing import Any, Literal, Unpack, cast
 import numpy as np
 
 from stickslip import plugins
-from stickslip.arguments import insist_on_numbers, numbers_checked
+from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
 from stickslip.identify.doctor import Diagnosis, examine
 from stickslip.identify.estimate import Identification, silent
@@ -31,7 +31,7 @@ from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, doctor_of, 
 Loops = str | Mapping[str, float] | Sequence[str | Mapping[str, float]] | None
 
 
-@numbers_checked
+@arguments_checked
 def identify(
     *logs: Log,
     method: str = "axis",
@@ -244,7 +244,12 @@ def sources_of(
         def doctor(record: Record, log: Log | None = log) -> list[Diagnosis]:
             return examiner.pieces(record, log)
 
-        opened = open_log(log, own, doctor)
+        try:
+            opened = open_log(log, own, doctor)
+        except InputError as error:
+            if number < fitted:
+                raise
+            raise InputError(f"--hold-out: {error}") from None
         if opened.written or opened.tells_numbers:
             for finding in opened.notes[:1]:
                 examiner.tell(f"{name}: {finding.line()}")
@@ -276,9 +281,10 @@ def loops_of(loop: Loops, count: int) -> list[str]:
         raise InputError(
             f"--loop is given {len(every)} times for {count} LOGs; give it once, or once for each"
         )
-    for numbers in every:
-        if not isinstance(numbers, str):
-            insist_on_numbers("loop", dict.fromkeys(numbers, "float"), numbers)
+    if not all(every):
+        raise InputError(
+            f"--loop: {loop!r} names no gain; give them, such as --loop kp=8,kd=0.08, or leave it out"
+        )
     texts = [x if isinstance(x, str) else ",".join(f"{k}={float(v)!r}" for k, v in x.items()) for x in every]
     return texts if len(texts) > 1 else texts * count
 

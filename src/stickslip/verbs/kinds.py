@@ -86,9 +86,12 @@ def require(path: object, *wanted: str) -> None:
         That names both kinds and the verb that takes the file.
     """
     from stickslip.errors import InputError
+    from stickslip.rules import with_article
 
     if not isinstance(path, (str, os.PathLike)):
-        raise InputError(f"{WORDS[wanted[0]][1]}, or its path, is wanted, not a {type(path).__name__}")
+        raise InputError(
+            f"{WORDS[wanted[0]][1]}, or its path, is wanted, not {with_article(type(path).__name__)}"
+        )
     file = Path(cast("str | os.PathLike[str]", path))
     kind = kind_of(file)
     if not kind or kind in wanted or not file.exists():

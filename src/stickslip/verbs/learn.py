@@ -14,12 +14,12 @@ import numpy as np
 from stickslip.analyse.learning import Convergence, over_angle, over_time, widest
 from stickslip.analyse.machine_axis import axis_of
 from stickslip.analyse.presliding_loop import Axis
-from stickslip.arguments import numbers_checked
+from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.learning import TimeTable, low_pass
 from stickslip.control.written import tables_of
-from stickslip.errors import InputError, UnknownName
+from stickslip.errors import InputError
 from stickslip.machines.drivetrain import Drivetrain
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
@@ -31,13 +31,13 @@ from stickslip.spec import Surroundings
 from stickslip.study.files import prepared_folder, unwritable
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-OVER = ("time", "angle")
 LARGEST = 1e6
 """N·m, bound of what is learned where the torque has none."""
 RETURNED = 1e-6
 """Of the range of a reference: how near to its start a repetition has to end."""
 
 
+@constructor_checked
 @dataclass(frozen=True, eq=False, repr=False)
 class LearningResult:
     """What was learned; printed, it is what `stickslip learn` prints.
@@ -82,6 +82,7 @@ class LearningResult:
             "feedforward": self.block.as_dict(),
         }  # fmt: skip
 
+    @arguments_checked
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the controller as `stickslip export --controller` and `rig run track --set controller=` read it.
 
@@ -107,7 +108,7 @@ class LearningResult:
         return target
 
 
-@numbers_checked
+@arguments_checked
 def learn(
     axis: RigidAxis | Machine,
     controller: Controller,
@@ -161,8 +162,6 @@ def learn(
     SimulationError
         If a run diverges.
     """
-    if over not in OVER:
-        raise UnknownName("domain of learning", over, OVER)
     if repetitions < 1:
         raise InputError(f"learn: repetitions = {repetitions} must be at least 1")
     loop = _Repeated(axis, controller, reference, duration)

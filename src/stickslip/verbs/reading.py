@@ -11,7 +11,7 @@ from typing import Any, Literal, TypedDict, Unpack, cast
 
 from numpy.typing import ArrayLike
 
-from stickslip.arguments import insist_on_numbers
+from stickslip.arguments import arguments_checked, insist_on, rules_in, written
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding
 from stickslip.readers import profiles
@@ -94,8 +94,8 @@ class Reading(TypedDict, total=False):
     unwrap: bool
 
 
-READ_AS = {name: getattr(said, "__forward_arg__", said) for name, said in Reading.__annotations__.items()}
-"""Annotations of `Reading` as they are written."""
+READ_AS = rules_in(written(Reading), globals())
+"""What the parts of `Reading` must be."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +115,7 @@ class Opened:
         return any(f.code == "profile" and " = " in f.message for f in self.notes)
 
 
+@arguments_checked
 def read(log: Log | None = None, **reading: Unpack[Reading]) -> Record:
     """Read a log as a record in SI units.
 
@@ -156,7 +157,7 @@ def doctor_of(log: Log | None) -> str:
 
 
 def check_reading(given: Mapping[str, Any]) -> None:
-    """Refuse a name that is none of `Reading`, and what is no number where one is meant.
+    """Refuse a name that is none of `Reading`, and what is of a wild kind.
 
     Raises
     ------
@@ -165,7 +166,7 @@ def check_reading(given: Mapping[str, Any]) -> None:
     for name in given:
         if name not in Reading.__annotations__:
             raise UnknownName("argument", name, tuple(Reading.__annotations__))
-    insist_on_numbers("reading", READ_AS, given)
+    insist_on("reading", READ_AS, given)
 
 
 def open_log(
@@ -185,7 +186,8 @@ def open_log(
     signals = {SHORT.get(n, n): said[n] for n in SIGNALS if said.get(n) is not None}
     if signals:
         if log is not None:
-            raise InputError(f"{', '.join(signals)} and a log exclude each other; give one of them")
+            given = [n for n in SIGNALS if said.get(n) is not None]
+            raise InputError(f"{', '.join(given)} and a log exclude each other; give one of them")
         return Opened(_part(_of_signals(signals, reading), reading, "the arrays"))
     if reading.get("units"):
         raise InputError("units is for arrays; give the unit of a column in map, such as q:deg")
@@ -208,7 +210,7 @@ def _of_signals(signals: Mapping[str, ArrayLike], reading: Reading) -> Record:
         if reading.get(name):
             raise InputError(f"{name} applies to columns of files and frames, not to arrays; leave it out")
     units = {SHORT.get(n, n): unit for n, unit in reading.get("units", {}).items()}
-    table, mapping = table_of_signals(signals, units)
+    table, mapping = table_of_signals(signals, units, {channel: n for n, channel in SHORT.items()})
     record = record_of(table, mapping, drive=_drive(reading), sample_time=reading.get("sample_time"))
     return _with_digest(record, digest_of(table))
 
@@ -218,10 +220,14 @@ def _of_data(data: Any, reading: Reading) -> Record:
         raise InputError("beside joins two files; put the columns of both into one table instead")
     table = table_in_memory(data)
     profile = reading.get("profile")
-    record = record_of(
-        table, reading.get("map", ()), drive=_drive(reading), sample_time=reading.get("sample_time"),
-        profile=profiles.load(Path(profile)) if profile else None,
-    )  # fmt: skip
+    kept = profiles.load(Path(profile)) if profile else None
+    period = reading.get("sample_time")
+    try:
+        record = record_of(
+            table, reading.get("map", ()), drive=_drive(reading), sample_time=period, profile=kept
+        )
+    except InputError as error:
+        raise InputError(f"the log: {error}") from None
     return _with_digest(record, digest_of(table))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal, cast
 
 from stickslip.approval import allow_code
-from stickslip.arguments import numbers_checked
+from stickslip.arguments import arguments_checked
 from stickslip.config import named_numbers
 from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.controller import Controller
@@ -28,8 +28,11 @@ from stickslip.verbs.compare import IdentifiedModel, identified_of
 from stickslip.verbs.reading import Log, open_log
 from stickslip.verbs.recommendation import RecommendationResult
 
+USUAL = {"loop": None, "linear": "PD", "bandwidth": 10.0, "damping": 1.0, "sample_time": None}
+"""What `recommend` takes where nothing is given."""
 
-@numbers_checked
+
+@arguments_checked
 def recommend(
     model: IdentifiedModel,
     *,
@@ -111,7 +114,9 @@ def recommend(
         One line that names the thing, its value and the remedy.
     """
     refuse_numbers(axes, confirm)
-    refuse_together(motion, amplitude, frequency, loop, linear)
+    refuse_together(motion, amplitude, frequency)
+    if loop is not None:
+        refuse_beside_loop(loop, linear=linear, bandwidth=bandwidth, damping=damping)
     tried = compensators_of(compensators)
     found = identified_of(model)
     at_hand = load_machine(machine) if isinstance(machine, (str, os.PathLike)) else machine
@@ -161,9 +166,7 @@ def refuse_numbers(axes: int, confirm: int) -> None:
         )
 
 
-def refuse_together(
-    motion: object | None, amplitude: float | None, frequency: float | None, loop: object, linear: str
-) -> None:
+def refuse_together(motion: object | None, amplitude: float | None, frequency: float | None) -> None:
     """Refuse what excludes each other.
 
     Raises
@@ -174,10 +177,24 @@ def refuse_together(
         raise InputError("--motion and --amplitude exclude each other; give one of them")
     if frequency is not None and amplitude is None:
         raise InputError(f"--frequency {frequency:g} needs a sinusoid; give --amplitude too")
-    if loop and linear != "PD":
+
+
+def refuse_beside_loop(loop: object, **given: object) -> None:
+    """Refuse a loop without gains, and what would place them.
+
+    Raises
+    ------
+    InputError
+    """
+    if not loop:
         raise InputError(
-            f"--linear {linear} cannot be combined with --loop, which sets the gains; leave it out"
+            f"--loop: {loop!r} names no gain; give them, such as --loop kp=8,kd=0.08, or leave it out"
         )
+    for name, value in given.items():
+        if value != USUAL[name]:
+            raise InputError(
+                f"--{name} {value} cannot be combined with --loop, which sets the gains; leave one out"
+            )
 
 
 def refuse_beside(controller: object, **given: object) -> None:
@@ -187,9 +204,8 @@ def refuse_beside(controller: object, **given: object) -> None:
     ------
     InputError
     """
-    usual = {"loop": None, "linear": "PD", "bandwidth": 10.0, "damping": 1.0, "sample_time": None}
     for name, value in given.items():
-        if value != usual[name]:
+        if value != USUAL[name]:
             option = name.replace("_", "-")
             raise InputError(
                 f"--{option} cannot be combined with --controller {controller}, which sets it; leave it out"
@@ -239,7 +255,7 @@ def own_loop(
     InputError
         As of `loop_of`, or if the loop has a limit and another one was given.
     """
-    gains, own = loop_of(given) if given else (None, dict[str, float]())
+    gains, own = (None, dict[str, float]()) if given is None else loop_of(given)
     if "limit" in own and math.isfinite(torque_limit):
         raise InputError(
             f"--torque-limit {torque_limit:g} and the limit of --loop exclude each other; give one of them"

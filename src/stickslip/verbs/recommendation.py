@@ -8,6 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError
@@ -19,6 +20,7 @@ from stickslip.report.recommendation_text import recommendation_lines, reduction
 from stickslip.study.files import prepared_folder
 
 
+@constructor_checked
 @dataclass(frozen=True, eq=False, repr=False)
 class RecommendationResult:
     """What to switch on, and what to expect; printed, it is what `stickslip recommend` prints.
@@ -92,6 +94,7 @@ class RecommendationResult:
         """What the user must know, one sentence each."""
         return self.recommendation.notes
 
+    @arguments_checked
     def save(self, path: str | os.PathLike[str] = "recommended.toml") -> Path:
         """Write the law and the setting, as `export` and `stickslip rig run track` take them.
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.arguments import numbers_checked
+from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.capacity import insist_on_jobs
 from stickslip.errors import InputError
 from stickslip.identify.estimate import silent
@@ -28,6 +28,7 @@ SHOWN = 12
 """Runs that a printed result shows, at most."""
 
 
+@constructor_checked
 @dataclass(frozen=True, eq=False, repr=False)
 class SweepResult:
     """A finished sweep.
@@ -52,6 +53,7 @@ class SweepResult:
     manifest: Mapping[str, Any]
     files: tuple[Path, ...]
 
+    @arguments_checked
     def columns(self, row: int = 0) -> Mapping[str, Array]:
         """What every case of a run varied and gave, by name, shape (cases,).
 
@@ -59,7 +61,14 @@ class SweepResult:
         ----------
         row : int
             Of `rows`.
+
+        Raises
+        ------
+        InputError
+            If there is no such row.
         """
+        if not 0 <= row < len(self.sweep.runs):
+            raise InputError(f"columns: row = {row} must be from 0 to {len(self.sweep.runs) - 1}")
         names = [*self.sweep.metrics, "flagged"]
         return dataset.read(self.folder, self.sweep, self.sweep.runs[row], names)
 
@@ -99,7 +108,7 @@ class SweepResult:
         return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
-@numbers_checked
+@arguments_checked
 def sweep(
     file: str | os.PathLike[str] | Sweep,
     folder: str | os.PathLike[str] | None = None,

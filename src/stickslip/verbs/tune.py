@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from stickslip.arguments import numbers_checked
+from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
 from stickslip.study.files import claim_folder
 from stickslip.sweep.plan import Sweep, load
@@ -15,7 +15,7 @@ from stickslip.sweep.tune import tune as search
 from stickslip.sweep.tuned_files import write
 
 
-@numbers_checked
+@arguments_checked
 def tune(
     file: str | os.PathLike[str] | Sweep,
     folder: str | os.PathLike[str] | None = None,

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from typing import Any, TextIO
 
 from stickslip.errors import StickslipError
+from stickslip.in_python import with_options
 
 Said = Callable[[dict[str, Any]], None]
 """Sends one line to the server."""
@@ -82,7 +83,8 @@ def outcome(request: dict[str, Any], say: Said) -> dict[str, Any]:
     """The last line."""
     try:
         tasks = importlib.import_module("stickslip.web.tasks")
-        return {"done": tasks.TASKS[request["task"]](request, say)}
+        with with_options():  # which the page has words of its own for
+            return {"done": tasks.TASKS[request["task"]](request, say)}
     except StickslipError as error:
         words = importlib.import_module("stickslip.web.wording").in_the_page(str(error))
         return {"error": " ".join(words.split()), "kind": type(error).__name__}

@@ -42,8 +42,11 @@ class Change:
 
     @property
     def percent(self) -> float:
-        """Change in per cent of the first value; not a number where that is 0, or the two differ in sign."""
-        return 100.0 * (self.second / self.first - 1.0) if self.first * self.second > 0.0 else math.nan
+        """Change in per cent of the first value; not a number where that is 0 or less than the interval of the change
+        is wide to one side, as an offset near 0, or the two differ in sign."""
+        near_zero = abs(self.first) <= 0.5 * (self.upper - self.lower)
+        told = self.first * self.second > 0.0 and not near_zero
+        return 100.0 * (self.second / self.first - 1.0) if told else math.nan
 
     @property
     def percent_span(self) -> tuple[float, float]:

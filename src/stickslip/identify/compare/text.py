@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from stickslip.identify.compare.levels import Change
@@ -11,20 +11,23 @@ from stickslip.identify.compare.levels import Change
 if TYPE_CHECKING:
     from stickslip.identify.compare.change import Comparison
 
+HEAD = ("first", "second", "unit", "change, 95 % interval")
+USUAL = (26, 11, 11, 12, 34)
 LEAST = 1e-6
 """A chance below it depends on how normal the estimates are, far out."""
 
 
 def lines(result: Comparison) -> Iterator[str]:
     """What `stickslip compare` prints."""
+    widths = widths_of([*result.changes, *result.levels])
     if result.changes:
-        yield f"{head('parameter')} p (Holm)"
+        yield f"{row(('parameter', *HEAD), widths)} p (Holm)"
     for c in result.changes:
-        yield f"{row(c)} {chance(c.p):<9}{'changed' if c.changed else ''}".rstrip()
+        yield f"{row(cells(c), widths)} {chance(c.p):<9}{'changed' if c.changed else ''}".rstrip()
     if result.levels:
-        yield f"{'' if not result.changes else chr(10)}{head('torque')}"
+        yield f"{'' if not result.changes else chr(10)}{row(('torque', *HEAD), widths)}"
     for c in result.levels:
-        yield row(c)
+        yield row(cells(c), widths)
     yield ""
     if not math.isnan(result.p):
         yield f"friction parameters together: p {equal_to(result.p)}"
@@ -36,15 +39,25 @@ def lines(result: Comparison) -> Iterator[str]:
     yield result.summary
 
 
-def head(what: str) -> str:
-    """Of a table of changes."""
-    return f"{what:<26}{'first':>11}{'second':>11}  {'unit':<11} {'change, 95 % interval':<34}"
+def cells(c: Change) -> tuple[str, ...]:
+    """Name, both values, unit, and the change in per cent or, where that has no meaning, in the unit."""
+    return c.name, f"{c.first:.5g}", f"{c.second:.5g}", c.unit, c.words()[len(c.name) + 1 :]
 
 
-def row(c: Change) -> str:
-    """Both values, and the change in per cent or, where that has no meaning, in the unit."""
-    by = c.words()[len(c.name) + 1 :]
-    return f"{c.name:<26}{c.first:>11.5g}{c.second:>11.5g}  {c.unit:<11} {by:<34}"
+def widths_of(changes: Sequence[Change]) -> tuple[int, ...]:
+    """Of all columns: as usual, or wider, so that none touches the next."""
+    return tuple(
+        max([usual, *(len(cell) + 1 for cell in column)])
+        for usual, column in zip(USUAL, zip(*map(cells, changes), strict=True), strict=False)
+    )
+
+
+def row(cells: Sequence[str], widths: Sequence[int]) -> str:
+    """A line of a table."""
+    name, first, second, unit, by = (
+        f"{cell:{side}{width}}" for cell, side, width in zip(cells, "<>><<", widths, strict=True)
+    )
+    return f"{name}{first}{second}  {unit}{by}"
 
 
 def chance(p: float) -> str:

@@ -13,12 +13,14 @@ from typing import Any, cast
 
 import numpy as np
 
+from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import change, excitation, physics, play, signals, spikes, timing, units
 from stickslip.identify.doctor.view import View
 from stickslip.identify.regression.regression import regress_axis
 from stickslip.identify.regression.regressions import Regress
+from stickslip.in_python import in_python
 from stickslip.readers.cut import range_words, taken
 from stickslip.record import Record
 
@@ -81,19 +83,27 @@ class Diagnosis:
         """What makes a result doubtful."""
         return tuple(f for f in self.findings if f.level == "warning")
 
+    def _line(self, finding: Finding) -> str:
+        """A finding in words: in Python its remedy names arguments, of arrays their own."""
+        reading: dict[str, Any] = self.record.meta.get("reading", {})
+        sources = {c["source"] for c in reading.get("columns", ())}
+        arrays = not reading.get("file") and sources == {"map"}
+        return in_python(finding.line(), "identify", arrays)
+
     def __str__(self) -> str:
-        lines = [f"{f.level:<8}{f.code:<24}{f.line()}" for f in self.findings]
+        lines = [f"{f.level:<8}{f.code:<24}{self._line(f)}" for f in self.findings]
         return "\n".join([*lines, f"{len(self.errors)} errors, {len(self.warnings)} warnings"])
 
     def _repr_html_(self) -> str:
         """A table in a notebook."""
         rows = "".join(
-            f"<tr><td>{f.level}</td><td>{escape(f.code)}</td><td>{escape(f.line())}</td></tr>"
+            f"<tr><td>{f.level}</td><td>{escape(f.code)}</td><td>{escape(self._line(f))}</td></tr>"
             for f in self.findings
         )
         tally = f"<p>{len(self.errors)} errors, {len(self.warnings)} warnings in {len(self.record)} usable rows</p>"
         return f"<table><tbody>{rows}</tbody></table>{tally}"
 
+    @arguments_checked
     def raise_for_errors(self, name: str = "the record") -> None:
         """Refuse an unusable record.
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.arguments import numbers_checked
+from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError, StepFailure, UnknownName
 from stickslip.jit import compiled_profile, flat
 from stickslip.model import Model, Reference
@@ -22,7 +22,7 @@ METHODS = ("auto", "step", "rate")
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-@numbers_checked
+@arguments_checked
 def respond(
     model: Model,
     reference: Reference,

@@ -42,7 +42,7 @@ export async function show(box) {
 
 function told(found) {
   const row = (c) => h("tr", {}, h("th", { scope: "row" }, c.name), h("td", {}, number(c.first)), h("td", {}, number(c.second)), h("td", {}, c.unit),
-    h("td", {}, c.percent === null ? "" : `${c.percent.toFixed(1).replace("-", "−")} %`), h("td", { class: c.changed ? "bad" : "good" }, c.changed ? "changed" : "not shown to have changed"));
+    h("td", {}, c.percent === null ? `${number(c.second - c.first)} ${c.unit}` : `${c.percent.toFixed(1).replace("-", "−")} %`), h("td", { class: c.changed ? "bad" : "good" }, c.changed ? "changed" : "not shown to have changed"));
   const table = (title, rows) => rows.length ? [h("h3", {}, title), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": title }, h("table", {}, h("thead", {}, h("tr", {}, ["quantity", "before", "after", "unit", "change", "verdict"].map((t) => h("th", { scope: "col" }, t)))), h("tbody", {}, rows.map(row))))] : [];
   return h("section", { class: "verdict" }, h("h2", {}, found.changed ? "Yes, it has changed" : "No change is shown"), h("p", { class: "big" }, found.summary), table("Parameters", found.parameters), table("Torques", found.levels),
     h("ul", {}, found.notes.map((n) => h("li", {}, n))));
