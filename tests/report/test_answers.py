@@ -19,10 +19,10 @@ from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
-from stickslip.report.answers import answers_of, meaning_of, one_number_each
+from stickslip.report.answers import answers_of, evidence, meaning_of, one_number_each
 from stickslip.report.axis_pictures import pictures_of
 from stickslip.report.identified import Source, rendered, symbol, tally
-from stickslip.report.next_steps import counts_of, lacking
+from stickslip.report.next_steps import EXPERIMENTS, MOTIONS, counts_of, lacking
 from stickslip.report.result_text import result_lines, result_lines_in_python
 from stickslip.report.sliding_torque import over_all_rows, sliding_of
 from stickslip.report.torque_pictures import friction_points, with_gaps
@@ -160,6 +160,24 @@ def test_what_is_missing_is_recorded_next() -> None:
         "stickslip identify 'a b.csv' inertia.npz --out model.toml  # with the options of this run",
     ]
     assert one_number_each(wide) == ["inertia, sigma2 not identified: too wide"]
+    told = [line for line in result_lines(poor, answers) if line.startswith("measure next")]
+    assert told[1] == (
+        "measure next: To settle inertia, record accelerations to and fro with your drive, or let a rig do it: "
+        "stickslip rig run inertia --rig machine.toml --out inertia.npz"
+    )
+    assert set(told) <= {*result_lines_in_python(poor, answers)}
+    # Every procedure that a number may ask for is told in words.
+    assert set(EXPERIMENTS.values()) == MOTIONS.keys()
+
+
+def test_a_loop_that_is_simulated_is_told_beside_the_torque() -> None:
+    found = identified()
+    seen = dataclasses.replace(found, misfit={**found.misfit, "drive_relative": 0.123})
+    said = "The loop, simulated with the model, makes a drive signal 12.3 % off the recorded one."
+    assert said in evidence(seen, None)
+    assert not any(
+        line.startswith("drive_relative") for line in result_lines(seen, answers_of(seen, [log()]))
+    )
 
 
 @pytest.mark.parametrize(

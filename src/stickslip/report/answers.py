@@ -244,6 +244,10 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
             f"square{plain_there(sliding)}."
         )
     out += force_errors(found.misfit, sliding is not None and not beaten(sliding))
+    if (off := found.misfit.get("drive_relative")) is not None:
+        out.append(
+            f"The loop, simulated with the model, makes a drive signal {percent(off)} off the recorded one."
+        )
     if isinstance(regression, Regression) and regression.orders:
         turn = 1.0 if linear(found) else 2.0 * math.pi
         per = "a metre" if linear(found) else "a revolution"

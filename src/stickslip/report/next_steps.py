@@ -26,6 +26,14 @@ EXPERIMENTS = {
     "sigma1": "stickslip", "c": "stickslip",
 }  # fmt: skip
 """The procedure that a rig runs for a number."""
+MOTIONS = {
+    "inertia": "accelerations to and fro", "sliding": "constant speeds in both directions, three of them at least",
+    "breakaway": "slow ramps of the torque from rest, until it moves",
+    "presliding": "slow ramps of the torque to and fro, below break-away", "stickslip": "slow constant speeds",
+}  # fmt: skip
+"""What it moves, for a drive that does it in a program of its own."""
+BY_A_RIG = "stickslip rig run "
+"""How its command begins."""
 
 
 @dataclass(frozen=True)
@@ -156,8 +164,10 @@ def rig_runs(names: Sequence[str], why: str) -> list[Step]:
     """Records to make."""
     return [
         Step(
-            f"{why}, record such a motion with your drive, or let a rig do it:" if number == 0 else "And:",
-            f"stickslip rig run {name} --rig machine.toml --out {name}.npz",
+            f"{why}, record {MOTIONS[name]} with your drive, or let a rig do it:"
+            if number == 0
+            else f"And {MOTIONS[name]}:",
+            f"{BY_A_RIG}{name} --rig machine.toml --out {name}.npz",
         )
         for number, name in enumerate(names)
     ]

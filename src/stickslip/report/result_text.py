@@ -7,25 +7,32 @@ import math
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.in_python import in_python
 from stickslip.report.answers import Answers, meaning_of, one_number_each
+from stickslip.report.next_steps import BY_A_RIG, Step
 
 JUDGED = (
-    "force_relative", "inverse_dynamics_relative", "position_", "sliding_rms", "fall_missing", "rms_Nm", "rms_N",
+    "force_relative", "inverse_dynamics_relative", "position_", "drive_relative", "sliding_rms", "fall_missing",
+    "rms_Nm", "rms_N",
 )  # fmt: skip
 """Misfits that sentences say, or that say little (the position of an open loop drifts); all are in `as_dict`."""
 
 
 def result_lines(found: Identification, answers: Answers) -> list[str]:
     """Estimates with 95 % intervals, what is not identified and why, how far the torque is off, and what to do now."""
-    steps = [f"next: {s.command}" if s.command else f"measure next: {s.what}" for s in answers.steps]
+    steps = [measured(s) or f"next: {s.command}" for s in answers.steps]
     return [*numbers_and_trust(found, answers), *steps]
+
+
+def measured(step: Step) -> str:
+    """A step that is a record to make; nothing of another."""
+    if step.command and not step.command.startswith(BY_A_RIG):
+        return ""
+    return f"measure next: {step.what} {step.command}".rstrip()
 
 
 def result_lines_in_python(found: Identification, answers: Answers) -> list[str]:
     """The same, what to do now in Python where it can be done there."""
     steps = [
-        f"next: {s.python}" if s.python
-        else f"next, in a shell: {s.command}" if s.command
-        else f"measure next: {s.what}" for s in answers.steps
+        f"next: {s.python}" if s.python else measured(s) or f"next, in a shell: {s.command}" for s in answers.steps
     ]  # fmt: skip
     return [*(in_python(line, "identify") for line in numbers_and_trust(found, answers)), *steps]
 

@@ -98,7 +98,8 @@ def identify(
     threshold : float, optional
         Velocity that is motion, rad/s or m/s (breakaway); 0.01.
     loop : str or mapping, or a sequence of them, optional
-        The sampled controller that drove the log, ``{"kp": 8.0, "kd": 0.08, "limit": 3.0}`` (also ki, kr, filter,
+        The sampled controller that drove the log, ``{"kp": 8.0, "kd": 0.08, "limit": 3.0}``: kp e + ki (integral of e)
+        + kr v_ref - kd v, kr = 0 where its velocity feedback knows no reference (also ki, kr, filter,
         period, count, span; or kv, kvp, kvi, feed of position P around velocity PI, as `recommend` has them): with it
         and a reference in the log the closed loop is simulated. One for all logs, or one each.
     loop_output : {"torque", "current", "voltage"}, optional

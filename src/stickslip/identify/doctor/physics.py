@@ -205,7 +205,10 @@ def _offset(view: View, smooth: Smooth, plain: Fit) -> Iterator[Finding]:
             part = f", {100 * abs(offset) / coulomb:.0f} % of Coulomb friction"
     if large:
         message = f"the torque has a constant part of {offset:.3g} {view.record.units['motor_torque']}{part}"
-        remedy = "a weight, a spring or an offset of the sensor; identify it along"
+        remedy = (
+            "a weight, a spring, an offset of the sensor, which is identified along, or friction that differs by "
+            "direction (identify --per-direction)"
+        )
         yield Finding("note", "offset", message, remedy=remedy)
 
 
