@@ -58,7 +58,7 @@ SLOPED, WIDELY, FEW = 0.1, 0.2, 0.2
 which the slowest rows lie where one may hide; and of the rows that must be faster for the level to be theirs."""
 STRAIGHT = 0.15
 """The same two parts of Fc where no fall is there: level and slope are then one straight line's. Of 16 such levels of
-another program's 200 logs, 5 to 15 % unsure, all held, wrong by 4 % at most. Beyond it none is identified."""
+another program's 200 logs, 5 to 15 % unsure, all held, wrong by 4 % at most."""
 FORM = 0.012
 """Part of Fc, one standard deviation, that its level is unsure by where the slope beside it is not told: of 103 levels
 on tuning steps 89 % held without it."""
@@ -68,7 +68,6 @@ LEVEL_UNTOLD = (
     "extrapolated: friction may still fall at the highest recorded speeds, and viscous friction is not told apart "
     "from it"
 )
-TOLD_TO = "certain sliding tells it to {share:.0%}; identified means at most {most:.0%}"
 STILL_ROUGH = "motor and load do not move as one even in the windows in which they do so best, and "
 UNSURE_THERE, ROUGHLY = "it is unsure to {share:.0%} there; identified means at most {most:.0%}", 0.1
 APART = (
@@ -248,8 +247,6 @@ class Regression:
         share = QUANTILE * level.std / max(abs(level.value), 1e-300)
         if share > ROUGHLY and self.widened > 1.0 and self.rough:
             return STILL_ROUGH + UNSURE_THERE.format(share=share, most=ROUGHLY)
-        if share > STRAIGHT:
-            return TOLD_TO.format(share=share, most=STRAIGHT)
         if self.slope_told:
             return ""
         excluded = self.falls <= EXCLUDED
