@@ -38,10 +38,9 @@ RISE, DEEPEST = -0.05, 2.0  # of Fc: bounds of A
 # Standard deviations of what no law holds, in parts of Fc.
 CURVE, AFTER, UNEVEN, LAGGING, AROUND = 0.002, 0.01, 0.03, 0.013, 0.005
 UNEVEN_FALL = 0.003  # of the fall of friction, which differs by direction as its level does
-EACH_FALL = 0.05  # the same where friction has a level and a slope of its own in each direction
-EACH_SLOPE = (
-    0.1  # of friction at the highest speed: what its slope in one direction makes it differ by from both
-)
+# The same where friction has a level and a slope of its own in each direction; and what these slopes make it differ by
+# from their mean at the highest speed, in parts of friction there.
+EACH_FALL, EACH_SLOPE = 0.05, 0.1
 LEANING, LEANS = (
     3,
     0.02,

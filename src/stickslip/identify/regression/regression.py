@@ -194,8 +194,7 @@ class Regression:
         names = [n for n in self.bands[0].numbers if n not in ("skew", "fs")]
         if not self.each_way:
             return names
-        apart = [f"mean of {n}" if n in ("fc", "sigma2") else n.removesuffix("_positive") for n in names]
-        return apart
+        return [f"mean of {n}" if n in ("fc", "sigma2") else n.removesuffix("_positive") for n in names]
 
     @property
     def left(self) -> float:
