@@ -106,6 +106,24 @@ def test_a_fall_of_friction_that_the_law_does_not_have_is_on_drawn_axes() -> Non
         assert friction.vs == 0.9
 
 
+@pytest.mark.parametrize("misfit", [{}, {"fall_missing_Nm": 0.1, "fall_missing_velocity": 0.9}])
+def test_friction_that_differs_by_direction_comes_late_on_drawn_axes_too(misfit: dict[str, float]) -> None:
+    """It was drawn without springs, a promise of an axis that has none."""
+    each = Model("coulomb", {"symmetry": "asymmetric"}, fc=0.3, fc_negative=0.2, sigma2=0.018)
+    uneven = replace(identified(), model=each, misfit=misfit)
+    drawn = [plant.friction for plant in list(plants_of(uneven, INERTIA, 10, 1))[1:]]
+    assert {f.law.name for f in drawn} == {"lugre"}
+    for friction in drawn:
+        p = friction.parameters
+        assert friction.law.chosen["symmetry"] == "asymmetric"
+        assert p.fc_negative < 0.9 * p.fc
+        assert (
+            p.fs - p.fc
+            == pytest.approx(p.fs_negative - p.fc_negative)
+            == pytest.approx(0.1 if misfit else 0.0)
+        )
+
+
 @pytest.mark.usefixtures("few")
 def test_a_static_torque_that_is_known_is_level_enough() -> None:
     law = {"k": 50.0, "fs": 0.335, "vs": 0.1}

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.binding import NEGATIVE
 from stickslip.errors import ParameterError
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
@@ -174,7 +175,7 @@ def _unmodelled(rms: float, motion: str, rng: np.random.Generator) -> tuple[tupl
 def _with_springs(model: Model, inertia: float, motion: str, rng: np.random.Generator) -> Model:
     """LuGre with the law's own sliding curve, that breaks away after a way that is drawn: where the law has no springs,
     and else with a chance of `LOST`, for an elastic drivetrain or backlash between the encoder and the friction."""
-    if model.law.name not in ("coulomb", "stribeck", "lugre") or not _plain(model):
+    if model.law.name not in ("coulomb", "stribeck", "lugre"):
         return model
     lost = float(rng.uniform()) < LOST
     springs = model.law.name == "lugre"
@@ -183,10 +184,12 @@ def _with_springs(model: Model, inertia: float, motion: str, rng: np.random.Gene
     size = 0.1 if motion == "linear" else 1.0
     way = size * _between(rng, *(LOST_MOTION if lost else BREAKAWAY))
     own: Any = model.parameters
-    curve = {n: getattr(own, n) for n in ("fs", "fc", "vs", "delta_s", "sigma2") if hasattr(own, n)}
+    names = [n + side for side in _ways(model) for n in ("fs", "fc", "vs", "delta_s", "sigma2")]
+    curve = {n: getattr(own, n) for n in names if hasattr(own, n)}
     if model.law.name == "coulomb":
         scale = float(model.law.velocity_scale(own)) if model.law.velocity_scale else 0.0
-        curve |= {"fs": own.fc, "vs": scale or 0.01 * size}
+        for side in _ways(model):
+            curve |= {f"fs{side}": curve[f"fc{side}"], f"vs{side}": scale or 0.01 * size}
     level = float(np.abs(sliding_torque(model, np.zeros(1)))[0])
     if not level > 0.0:
         return model
@@ -203,19 +206,27 @@ def _with_springs(model: Model, inertia: float, motion: str, rng: np.random.Gene
 def _falling(model: Model, found: Identified) -> Model:
     """The law with the fall of friction that the record shows, where it has none itself."""
     fall = next((found.misfit[k] for k in FALL_MISSING if k in found.misfit), 0.0)
-    if not (fall > 0.0 and model.law.name == "coulomb" and _plain(model)):
+    if not (fall > 0.0 and model.law.name == "coulomb"):
         return model
     own: Any = model.parameters
-    level, velocity = float(own.fc), found.misfit["fall_missing_velocity"]
+    curve: dict[str, Any] = {}
+    for way in _ways(model):
+        level = float(getattr(own, f"fc{way}"))
+        curve |= {
+            f"fs{way}": level + fall,
+            f"fc{way}": level,
+            f"vs{way}": found.misfit["fall_missing_velocity"],
+        }
+        curve[f"sigma2{way}"] = float(getattr(own, f"sigma2{way}"))
     # Of its stiffness nothing is left once springs are drawn.
-    return Model("stribeck", k=level / 1e-3, fs=level + fall, fc=level, vs=velocity, sigma2=float(own.sigma2))
+    return Model("stribeck", _choices(model), k=float(own.fc) / 1e-3, **curve)
 
 
-def _plain(model: Model) -> bool:
-    """Whether the law is the same in both directions."""
-    return model.law.chosen.get("symmetry", "symmetric") == "symmetric"
+def _ways(model: Model) -> tuple[str, ...]:
+    """How the parameters of each direction end: one ending where both are the same."""
+    return ("",) if model.law.chosen.get("symmetry", "symmetric") == "symmetric" else ("", NEGATIVE)
 
 
 def _choices(model: Model) -> dict[str, str]:
-    """Curve and viscous part, where the law has the choice."""
-    return {k: v for k, v in model.law.chosen.items() if k in ("curve", "viscous")}
+    """Curve, viscous part and whether both directions are the same, where the law has the choice."""
+    return {k: v for k, v in model.law.chosen.items() if k in ("curve", "viscous", "symmetry")}
