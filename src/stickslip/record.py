@@ -67,14 +67,25 @@ class Record:
 
     @arguments_checked
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the record as .npz: arrays, and units and meta as JSON (no pickle). Returns the path."""
+        """Write the record as .npz: arrays, and units and meta as JSON (no pickle). Returns the path.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written there.
+        """
         target = Path(path)
         header = json.dumps({"units": dict(self.units), "meta": dict(self.meta)})
         draft = target.with_name(target.name + ".part")
-        with draft.open("wb") as file:
-            arrays: dict[str, Any] = {"time": self.time, **self.channels}
-            np.savez(file, __header__=np.array(header), **arrays)
-        os.replace(draft, target)
+        try:
+            with draft.open("wb") as file:
+                arrays: dict[str, Any] = {"time": self.time, **self.channels}
+                np.savez(file, __header__=np.array(header), **arrays)
+            os.replace(draft, target)
+        except OSError as error:
+            raise InputError(
+                f"path: cannot write {target} ({error.strerror or error}); choose another place"
+            ) from None
         return target
 
     @classmethod

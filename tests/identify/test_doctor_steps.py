@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from stickslip.cli import main
 from stickslip.identify.doctor import examine
 from stickslip.record import Record
 
@@ -47,3 +49,19 @@ def test_a_torque_that_acts_late_is_not_turned() -> None:
     """Its power at the velocity of its row is negative where it accelerates much; its inertia is not."""
     assert "torque-sign" not in codes(steps(0.06, 4, 1000.0))
     assert "torque-sign" in codes(steps(0.06, 0, 1000.0, sign=-1.0))
+
+
+@pytest.mark.parametrize(
+    ("apart", "unit"), [(1.0, "ms"), (4.0, "ms"), (1000.0, "us"), (250.0, "us"), (1e6, "ns")]
+)
+def test_a_time_without_a_unit_is_in_the_one_that_makes_it_a_drives(
+    apart: float, unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Microseconds were said to be milliseconds."""
+    record = steps(0.06, 0, 1000.0)
+    table = np.column_stack([apart * np.arange(len(record)), record["position"], record["motor_torque"]])
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="time,position_rad,torque_Nm", comments="")
+    assert main(["doctor", str(tmp_path / "log.csv")]) == 2
+    said = capsys.readouterr().out
+    assert f"that is {unit} rather than s" in said
+    assert f"--map time=time:{unit}" in said

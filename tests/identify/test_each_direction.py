@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from stickslip.errors import InputError
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.plain import inverse_identification
 from stickslip.identify.estimate import Identification
@@ -157,6 +158,15 @@ def test_each_direction_is_held_against_certain_sliding(logs: Any, seed: int, ce
         assert found[name].upper - found[name].lower < 0.3 * truth[name]
     for name, true in truth.items():
         assert found[name].lower <= true <= found[name].upper
+
+
+def test_a_weight_is_no_friction_that_differs_by_direction(logs: Any) -> None:
+    """Friction of 0.79 N·m was identified where 0.35 acted beside a weight of 0.45, and -0.1 in the other direction."""
+    log = logs.draw(2000160, "actual", 1000, "feedforward", "staircase", "clean")
+    weight = 1.6 * log.truth["fc"] - log.truth["offset"]
+    record = Experiment("log", log.time, log.position, log.torque + weight)
+    with pytest.raises(InputError, match=r"larger than friction.*leave out --per-direction"):
+        identify_axis([record], ServoAxis(drive_side="load"), ["coulomb"], per_direction=True)
 
 
 def test_both_directions_know_of_each_other(logs: Any) -> None:

@@ -54,3 +54,7 @@ def test_an_arm_that_hangs_at_half_a_turn():
     assert angle.value == pytest.approx(math.pi + 0.04, abs=0.03)
     assert angle.lower < angle.value < angle.upper
     assert found.details["mechanics"].gravity_angle == pytest.approx(angle.value)
+    # Asked wherever two methods are apart, by the name of the estimate.
+    sliding = found.details["regression"]
+    assert sliding.confirmed("gravity_angle") == sliding.confirmed("gravity")
+    assert sliding.confirmed("gravity")

@@ -80,3 +80,13 @@ def test_the_output_error_that_stands_in_is_held_against_certain_sliding(
     assert told
     assert [e.name for e in told if not e.lower <= log.truth[e.name] <= e.upper] == []
     assert found.details["regression"] is not None
+
+
+@pytest.mark.parametrize("period", [0.3, 1000.0])
+def test_rows_too_far_apart_for_dynamics_are_refused_at_once(logs: Any, period: float) -> None:
+    """Microseconds under "Time [s]" were worked on for minutes, and no interrupt was heard."""
+    log = logs.draw(4101, "held", 1000, "p-pi", "production", "clean", duration=4.0)
+    with pytest.raises(
+        InputError, match=r"too far for accelerations.*--map time=COLUMN:ms.*--method sliding"
+    ):
+        identify_axis([record(log, period * np.arange(log.time.size))], AXIS)

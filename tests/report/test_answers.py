@@ -19,7 +19,7 @@ from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
-from stickslip.report.answers import answers_of, evidence, meaning_of, one_number_each
+from stickslip.report.answers import answers_of, either_way, evidence, meaning_of, one_number_each
 from stickslip.report.axis_pictures import pictures_of
 from stickslip.report.identified import Source, rendered, symbol, tally
 from stickslip.report.next_steps import EXPERIMENTS, MOTIONS, counts_of, lacking
@@ -254,4 +254,16 @@ def test_python_is_told_what_to_do_next_in_python() -> None:
     out = result_lines_in_python(found, answers_of(found, [log()], "model.toml"))
     assert out[-2].startswith("next: advice = ss.recommend(found, bandwidth=10, sample_time=")
     assert out[-1] == 'next: ss.export(advice, to="c99", folder="c")'
-    assert out[:-2] == result_lines(found, answers_of(found, [log()], "model.toml"))[:-2]
+    shell = result_lines(found, answers_of(found, [log()], "model.toml"))[:-2]
+    assert out[:-2] == [line.replace("--per-direction", "per_direction=True") for line in shell]
+
+
+def test_a_constant_torque_may_be_friction_that_differs_by_direction() -> None:
+    found = identified()
+    (said,) = either_way(found)
+    assert re.search(
+        r"friction that is (19|20|21)[.0-9]* % of its level greater in one direction; --per-", said
+    )
+    assert said in answers_of(found, [log()]).evidence
+    small = [dataclasses.replace(e, value=0.01 * FC) if e.name == "offset" else e for e in found.estimates]
+    assert either_way(dataclasses.replace(found, estimates=tuple(small))) == []

@@ -44,7 +44,10 @@ def add_arguments(parser: argparse.ArgumentParser, *, part: bool = False) -> Non
     ):
         group.add_argument(option, type=float, metavar=unit, help=what)
     group.add_argument(
-        "--side", choices=("motor", "load"), help="side of the gear that was recorded (default motor)"
+        "--side",
+        choices=("motor", "load"),
+        help="side of the gear that the result is about (default motor); "
+        "a signal measured on the load's side: --map CHANNEL=COLUMN:UNIT@load",
     )
     if part:
         _add_part(parser.add_argument_group("part of the record"))

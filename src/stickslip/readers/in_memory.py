@@ -16,6 +16,8 @@ from stickslip.readers.convert import LINEAR
 from stickslip.readers.table_columns import Column, Table
 from stickslip.rules import with_article
 
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
 FORMAT = "arrays"
 
 
@@ -41,10 +43,7 @@ def table_of_signals(
     columns: list[Column] = []
     for name, values in signals.items():
         said = arguments.get(name, name)
-        try:
-            numbers = np.asarray(values, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"{said} is no array of numbers; give one number a sample") from None
+        numbers = numbers_of(said, values)
         if numbers.ndim != 1:
             raise InputError(f"{said} has shape {numbers.shape}; give one number a sample, shape (n,)")
         columns.append(Column(name, numbers))
@@ -66,6 +65,25 @@ def table_of_signals(
     # A channel that is not given must not be guessed from another's name.
     left_out = {role: "none" for role in KINDS if role not in channels}
     return Table(FORMAT, tuple(columns)), channels | left_out
+
+
+def numbers_of(name: str, values: Any) -> Array:
+    """A signal's numbers; of dates and of differences of time (NumPy's), seconds from the first.
+
+    Raises
+    ------
+    InputError
+        If they are none.
+    """
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind in "mM":
+            return np.asarray((given - given[:1]) / np.timedelta64(1, "s"), dtype=np.float64)
+        if given.dtype.kind != "c":
+            return np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        pass
+    raise InputError(f"{name} is no array of numbers; give one number a sample")
 
 
 def table_in_memory(data: Any) -> Table:

@@ -30,6 +30,8 @@ ELSEWHERE = 1.5
 """Times the force error of the fitted records, from which on that of held-out ones is one of another machine."""
 ROUGH = 0.1
 """Of the torque where the axis slides for certain: what a model misses at most for its form to be taken as right."""
+UNEVEN = 0.03
+"""Of friction's level: a constant torque from which on it may be worth two levels."""
 FALL_MISSING = ("fall_missing_Nm", "fall_missing_N")
 """A fall of friction with velocity that the law does not have."""
 OWN_WORDS = {
@@ -244,6 +246,7 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
             f"square{plain_there(sliding)}."
         )
     out += force_errors(found.misfit, sliding is not None and not beaten(sliding))
+    out += either_way(found)
     if (off := found.misfit.get("drive_relative")) is not None:
         out.append(
             f"The loop, simulated with the model, makes a drive signal {percent(off)} off the recorded one."
@@ -262,6 +265,21 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
         what = f"{'force' if linear(found) else 'torque'}: {quantity(float(rms), unit_in(found, 'N·m'))}"
         out.append(f"What the curve leaves of the {what} root mean square.")
     return out
+
+
+def either_way(found: Identification) -> list[str]:
+    """That a constant torque may be friction that differs by direction, in a sentence; nothing where none shows."""
+    by_name = {e.name: e for e in found.estimates}
+    if "fc_negative" in by_name or not {"offset", "fc"} <= by_name.keys():
+        return []
+    offset, level = by_name["offset"], by_name["fc"].value
+    shown = offset.identified and level > abs(offset.value) > UNEVEN * level
+    if not shown or offset.lower <= 0.0 <= offset.upper:
+        return []
+    return [
+        f"The constant torque may as well be friction that is {percent(2.0 * abs(offset.value) / level)} of its level "
+        "greater in one direction; --per-direction gives each its own."
+    ]
 
 
 def within_speeds(regression: Regression, unit: str) -> str:

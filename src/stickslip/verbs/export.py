@@ -29,6 +29,7 @@ from stickslip.rules import with_article
 from stickslip.spec import Surroundings
 from stickslip.study.files import prepared_folder, unwritable
 from stickslip.study.study import load_run
+from stickslip.verbs import own_files
 from stickslip.verbs.export_maps import map_in, only_map
 from stickslip.verbs.export_notes import around_of, axis_of, constant_torque, notes_on, notes_on_controller
 from stickslip.verbs.identification import IdentificationResult
@@ -87,7 +88,7 @@ class ExportResult:
             If a file cannot be written.
         """
         prepared_folder(Path(folder))
-        written: list[Path] = []
+        made: list[Path] = []
         for name, content in self.files.items():
             path = Path(folder) / name
             try:
@@ -95,8 +96,9 @@ class ExportResult:
                 path.write_bytes(content if isinstance(content, bytes) else content.encode())
             except OSError as error:
                 raise unwritable(path, error) from None
-            written.append(path)
-        return replace(self, paths=tuple(written))
+            made.append(path)
+        own_files.written(made)
+        return replace(self, paths=tuple(made))
 
     def __str__(self) -> str:
         lines = [f"{self.target.title}:", *(f"  {path}" for path in self.paths or self.files)]

@@ -28,6 +28,7 @@ from stickslip.report.answers import Answers, answers_of
 from stickslip.report.identified import Source, files_of, write_identification
 from stickslip.report.result_text import interval_text, result_lines_in_python
 from stickslip.study.files import prepared_folder
+from stickslip.verbs import own_files
 
 if TYPE_CHECKING:
     import pandas
@@ -167,9 +168,11 @@ class IdentificationResult:
         target = Path(path)
         target = target if target.suffix == ".toml" else target / "model.toml"
         prepared_folder(target.parent)
-        return write_model(
+        made = write_model(
             target, self.identification, data=self._data, law=self.law_file, more=self._recorded()
         )
+        own_files.written([made])
+        return made
 
     @arguments_checked
     def report(
@@ -189,9 +192,11 @@ class IdentificationResult:
             If it cannot be written.
         """
         prepared_folder(Path(path).parent)
-        return write_identification(
+        made = write_identification(
             path, self.identification, self.sources, versions=versions(), model_file=model_file
         )
+        own_files.written([made])
+        return made
 
     def identified(self) -> Identified:
         """What reading the saved model gives, without a file.

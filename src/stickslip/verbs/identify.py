@@ -137,6 +137,8 @@ position_map, load, intervals, robust
     )  # fmt: skip
     examiner = Examiner((*accept, *(["missing-column"] if kind.takes_current else [])), regress, tell)
     sources = sources_of(logs, _listed(hold_out), loop, reading, examiner)
+    if pendulum:  # The doctor's advice is taken.
+        sources = [replace(s, findings=[f for f in s.findings if f.code != "gravity"]) for s in sources]
     records = [s.record for s in sources]
     options = replace(options, held_out=sum(s.held_out for s in sources))
     if method == "axis" and friction_alone(records, options):

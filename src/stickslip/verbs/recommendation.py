@@ -18,6 +18,7 @@ from stickslip.recommend.file import setting_table, write_setting
 from stickslip.recommend.recommend import Candidate, Recommendation
 from stickslip.report.recommendation_text import recommendation_lines, reduction, safety
 from stickslip.study.files import prepared_folder
+from stickslip.verbs import own_files
 
 
 @constructor_checked
@@ -109,7 +110,9 @@ class RecommendationResult:
             If nothing is recommended, or the file cannot be written.
         """
         prepared_folder(Path(path).parent)
-        return write_setting(path, self.identified, self.recommendation)
+        made = write_setting(path, self.identified, self.recommendation)
+        own_files.written([made])
+        return made
 
     def table(self) -> Table:
         """The content of the file that `save` writes."""

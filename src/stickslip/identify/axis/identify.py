@@ -46,6 +46,8 @@ SIMPLEST = (
     "additional parameters ({more}) the record determines none, and no fall of friction with velocity shows where the "
     "axis slides."
 )
+SLOWEST = 0.25
+"""s between two samples, from which on a record says nothing of an axis's dynamics."""
 HELD_OUT = 0.3
 """Last part of every record that is held out where several laws are compared and no validation record is given."""
 
@@ -113,6 +115,7 @@ def identify_axis(
     """
     if not laws:
         raise InputError("no law to identify; name at least one")
+    refuse_slow(experiments)
     if intervals not in INTERVALS:
         raise UnknownName("source of intervals", intervals, INTERVALS)
     tried = [plugins.law(x) if isinstance(x, str) else x for x in laws]
@@ -123,6 +126,8 @@ def identify_axis(
     asked = Asked(free, frozen, values or {}, extras, robust)
     refuse_harmonics(experiments, extras.harmonics + extras.friction_harmonics, simulated=True)
     evidence, notes = looked_at(experiments, validation, axis, extras, skew, per_direction, regress)
+    if per_direction:
+        refuse_a_weight(evidence.sliding, axis)
     if evidence.inverse is None:
         require_start(evidence.experiments, axis, tried, asked)
     if not plain_axis(asked) or (per_direction and "offset" not in frozen):
@@ -152,6 +157,40 @@ def identify_axis(
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."
     return by_output_error(chosen, own, evidence, notes, profiles=profiles, lacking=lacking)
+
+
+def refuse_slow(experiments: Sequence[Experiment]) -> None:
+    """Refuse records that show no acceleration and no reversal, and whose observer would take hours.
+
+    Raises
+    ------
+    InputError
+    """
+    for t in experiments:
+        if t.period >= SLOWEST:
+            raise InputError(
+                f"{t.name}: samples are {t.period:.3g} s apart, too far for accelerations and reversals to be seen; "
+                "say the unit of the time if it is wrong (--map time=COLUMN:ms), log faster, or identify the curve of "
+                "constant speeds with --method sliding"
+            )
+
+
+def refuse_a_weight(sliding: Regression | None, axis: ServoAxis) -> None:
+    """Refuse friction per direction where it would drive the axis in one of them: a constant torque acts.
+
+    Raises
+    ------
+    InputError
+    """
+    if sliding is None or not sliding.each_way:
+        return
+    level, constant = abs(sliding.numbers["fc"].value), sliding.numbers["offset"].value
+    for name in ("fc_positive", "fc_negative"):
+        if sliding.interval(name)[1] < 0.0:
+            raise InputError(
+                f"a constant torque of {constant:.3g} {axis.unit('N·m')} is larger than friction, {level:.3g}, so that "
+                "it is no difference of its directions but a weight, a spring or an offset; leave out --per-direction"
+            )
 
 
 def simplest_of(

@@ -15,6 +15,8 @@ FEWEST = 20
 """Usable rows without which nothing can be said."""
 SHORTEST = 1e-9
 """s between two samples: no drive is faster, so that the unit must be another."""
+FEW_MS = 100.0
+"""Of a unit that nobody states: samples so many apart are so many ms; farther apart, microseconds."""
 UNEVEN = 0.2
 """A distance is uneven when it differs from the usual one by this share."""
 JITTER = 0.02
@@ -122,6 +124,11 @@ def sampling(view: View) -> Iterator[Finding]:
         )
 
 
+def finer(period: float) -> str:
+    """The unit in which samples so far apart, were it s, are those of a drive."""
+    return "ms" if period < FEW_MS else "us" if period < 1e3 * FEW_MS else "ns"
+
+
 def scale(view: View) -> Iterator[Finding]:
     """Milliseconds for seconds, and the reverse, by the sample interval."""
     if view.time.size < 2:
@@ -131,15 +138,15 @@ def scale(view: View) -> Iterator[Finding]:
         yield Finding(
             "error",
             "time-unit",
-            f"samples are {period:g} apart and nobody states the unit: that is ms rather than s",
-            remedy=f"say {view.mapped('time', 'ms')}, or {view.mapped('time', 's')} if it is right",
+            f"samples are {period:g} apart and nobody states the unit: that is {finer(period)} rather than s",
+            remedy=f"say {view.mapped('time', finer(period))}, or {view.mapped('time', 's')} if it is right",
         )
     elif period >= 0.1:
         yield Finding(
             "warning",
             "slow-sampling",
             f"samples are {period:g} s apart; friction changes faster",
-            remedy=f"log faster, or say {view.mapped('time', 'ms')} if the unit is wrong",
+            remedy=f"log faster, or say {view.mapped('time', finer(period))} if the unit is wrong",
         )
     elif period < SHORTEST:
         yield Finding(

@@ -216,8 +216,12 @@ class Regression:
         return UNMOVED if swings and not any(self.above_chance(n) for n in unseen) else ""
 
     def confirmed(self, name: str) -> bool:
-        """Whether more than one band of frequencies tells a number, whatever the skews they were fitted with."""
-        return len({b.corner for b in that_tell(name, self.bands)}) > 1
+        """Whether more than one band of frequencies tells a number, whatever the skews they were fitted with.
+
+        Of a pendulum's weight and of the angle at which it hangs, both amplitudes.
+        """
+        names = sorted(ROTATED) if name.startswith("gravity") else [name]
+        return all(len({b.corner for b in that_tell(n, self.bands)}) > 1 for n in names)
 
     @property
     def rough(self) -> bool:
