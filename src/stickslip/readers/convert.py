@@ -131,6 +131,7 @@ def convert(
         }
         listed.append({**entry, "factor": scale, "side": choice.side or "motor", "steps": steps})
     said += _one_kind(channels, units, listed, drive)
+    said += _idle_gear(listed, drive)
     derived, more = _torque_from_current(channels, units, drive, linear)
     said += more
     reading = {
@@ -235,6 +236,17 @@ def _one_kind(
             entry["factor"] *= factor
             entry["steps"].append(f"{2e3 * math.pi * way:g} mm a revolution")
     return []
+
+
+def _idle_gear(listed: Sequence[dict[str, Any]], drive: Drive) -> list[Finding]:
+    """That a gear ratio converts nothing, since every signal was taken as measured on the motor's side."""
+    moved = [e for e in listed if e["channel"] in (*MOTION, *EFFORT)]
+    used = drive.side == "load" or not math.isnan(drive.lead) or any(e["side"] == "load" for e in moved)
+    if math.isnan(drive.gear_ratio) or used:
+        return []
+    message = f"gear ratio {drive.gear_ratio:g} converts nothing: every signal counts as the motor side's"
+    remedy = "say which is the load side's, such as --map position=COLUMN:UNIT@load, or leave it at that"
+    return [Finding("note", "gear-ratio", message, remedy=remedy)]
 
 
 def _torque_from_current(

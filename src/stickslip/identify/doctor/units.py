@@ -202,7 +202,8 @@ def velocity_scale(view: View) -> Iterator[Finding]:
             "error",
             "velocity-mismatch",
             message,
-            remedy="check both units and whether one is on the other side of a gear",
+            remedy="check both units, and whether one is on the other side of a gear: --gear-ratio N and, for the "
+            "load's, --map CHANNEL=COLUMN:UNIT@load",
         )
 
 
