@@ -93,11 +93,11 @@ def test_both_sides_of_a_gear(tmp_path):
     load = read(path, ["position=q_arm [rad]:rad@load"], drive=Drive(gear_ratio=50.0, side="load"))
     np.testing.assert_allclose(load["position"], [0.0, 0.5])
     np.testing.assert_allclose(load["motor_torque"], [50.0, 100.0])
+    with pytest.raises(InputError, match="--gear-ratio"):
+        read(path, ["position=q_arm [rad]:rad@load"])
     idle = read(log(tmp_path, "time [s],q [rad],torque [Nm]\n0,0,1\n1,0.5,2\n"), drive=Drive(gear_ratio=50.0))
     (said,) = [f for f in idle.meta["reading"]["findings"] if f["code"] == "gear-ratio"]
     assert said["level"] == "note"
     assert "converts nothing" in said["message"]
     for moved in (motor, load):
         assert "gear-ratio" not in {f["code"] for f in moved.meta["reading"]["findings"]}
-    with pytest.raises(InputError, match="--gear-ratio"):
-        read(path, ["position=q_arm [rad]:rad@load"])
