@@ -87,6 +87,13 @@ def test_a_refusal_says_that_what_no_record_told_decides() -> None:
     assert not [n for n in notes_on(unsure, None, [Candidate(fed, (1.2,), (worse,))]) if "best estimate" in n]
 
 
+def test_a_weight_that_no_setting_holds_is_told() -> None:
+    hanging = replace(identified(), axis={"inertia": INERTIA, "gravity": 0.4, "gravity_angle": 0.0})
+    told = Candidate(Setting("coulomb", "feedforward", 0.8, inertia_feedforward=INERTIA), (0.3,), ())
+    assert any("weight is not part of the setting" in n for n in notes_on(hanging, told, [told]))
+    assert not any("weight" in n for n in notes_on(identified(), told, [told]))
+
+
 def test_what_a_record_leaves_of_the_torque_acts_on_drawn_axes_as_cogging() -> None:
     """It was looked for by a name that no identification gives, so that no axis had any."""
     plants = list(plants_of(replace(identified(), misfit={"sliding_rms_Nm": 0.02}), INERTIA, 40, 1))
