@@ -63,8 +63,8 @@ def notes_on(
         yield f"On {weak} axes {limit}, though not below that of the best estimate: they do not follow."
     if float(found.axis.get("gravity", 0.0) or 0.0):
         yield (
-            "The pendulum's weight is not part of the setting: the error that it makes is in the numbers above. Less is "
-            "left once gravity sin(q - gravity_angle) of the model is added to the drive's torque."
+            "The pendulum's weight is not part of the setting: the error that it makes is in the numbers above. Less "
+            "is left once gravity sin(q - gravity_angle) of the model is added to the drive's torque."
         )
     unknown = [e.name for e in found.estimates if not e.identified]
     if not found.law_estimates[0]:
