@@ -29,6 +29,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -184,3 +185,8 @@ def suggestion(name: str, known: Iterable[str], otherwise: str = "") -> str:
         *others, last = near
         return f"did you mean {', '.join(others)} or {last}?" if others else f"did you mean {last}?"
     return otherwise or (f"choose from {', '.join(names)}" if names else "none is registered")
+
+
+def unwritable(path: Path, error: OSError) -> InputError:
+    """The error that says that a path cannot be written, and why."""
+    return InputError(f"cannot write {path} ({error.strerror or error}); choose another place with --out")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from stickslip.arguments import arguments_checked, insist_on_own
-from stickslip.errors import InputError, suggestion
+from stickslip.errors import InputError, suggestion, unwritable
 
 if TYPE_CHECKING:
     import pandas
@@ -83,9 +83,7 @@ class Record:
                 np.savez(file, __header__=np.array(header), **arrays)
             os.replace(draft, target)
         except OSError as error:
-            raise InputError(
-                f"path: cannot write {target} ({error.strerror or error}); choose another place"
-            ) from None
+            raise unwritable(target, error) from None
         return target
 
     @classmethod

@@ -139,10 +139,10 @@ def rig_of(args: argparse.Namespace) -> Rig:
 def performed(args: argparse.Namespace) -> int:
     """`stickslip rig run`."""
     from stickslip.cli import _output
-    from stickslip.errors import InputError
+    from stickslip.errors import InputError, unwritable
     from stickslip.rigs.procedures import procedure
     from stickslip.rigs.procedures.base import perform, planned
-    from stickslip.study.files import prepared_folder, unwritable
+    from stickslip.study.files import prepared_folder
 
     kind = procedure(args.procedure)
     chosen = kind.with_options(pairs(args.set))

@@ -60,8 +60,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the record and print the metrics."""
     from stickslip.cli import _output
-    from stickslip.errors import InputError
-    from stickslip.study.files import prepared_folder, unwritable
+    from stickslip.errors import InputError, unwritable
+    from stickslip.study.files import prepared_folder
     from stickslip.study.study import execute, load_run
 
     planned = load_run(args.file)

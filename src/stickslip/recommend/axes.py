@@ -17,6 +17,7 @@ import numpy as np
 
 from stickslip.binding import NEGATIVE
 from stickslip.errors import ParameterError
+from stickslip.identify.axis.falling import missing_fall
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.monte_carlo import draw_models, sliding_torque
@@ -36,8 +37,6 @@ WAVES = 3
 """At most so many at once."""
 LEFT = ("sliding_rms_Nm", "sliding_rms_N")
 """What an identification leaves of the torque where the axis slides for certain: as large they are at most (RMS)."""
-FALL_MISSING = ("fall_missing_Nm", "fall_missing_N")
-"""A fall of friction with velocity that the record shows and the law does not have."""
 BREAKAWAY = (3e-5, 3e-3)
 """rad (a tenth of it in m), displacement at which a contact without springs in its law is taken to break away."""
 LOST = 0.5
@@ -205,7 +204,7 @@ def _with_springs(model: Model, inertia: float, motion: str, rng: np.random.Gene
 
 def _falling(model: Model, found: Identified) -> Model:
     """The law with the fall of friction that the record shows, where it has none itself."""
-    fall = next((found.misfit[k] for k in FALL_MISSING if k in found.misfit), 0.0)
+    fall = missing_fall(found.misfit)
     if not (fall > 0.0 and model.law.name == "coulomb"):
         return model
     own: Any = model.parameters

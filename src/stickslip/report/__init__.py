@@ -55,9 +55,10 @@ def write(result: StudyResult) -> Path:
         from stickslip.report.rig_report import write_rig_report
 
         return write_rig_report(result)
+    from stickslip.errors import unwritable
     from stickslip.report._view import StudyView
     from stickslip.report.html import render
-    from stickslip.report.page import replaced, unwritable
+    from stickslip.report.page import replaced
 
     view = StudyView(result)
     target = result.folder / "report.html"

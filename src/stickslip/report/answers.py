@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.axis.agreed import on_timing
+from stickslip.identify.axis.falling import missing_fall
 from stickslip.identify.axis.loop_check import OTHER_LOOP
 from stickslip.identify.axis.problem import mechanics_parameters
 from stickslip.identify.estimate import Estimate, Identification
@@ -32,8 +33,6 @@ ROUGH = 0.1
 """Of the torque where the axis slides for certain: what a model misses at most for its form to be taken as right."""
 UNEVEN = 0.03
 """Of friction's level: a constant torque from which on it may be worth two levels."""
-FALL_MISSING = ("fall_missing_Nm", "fall_missing_N")
-"""A fall of friction with velocity that the law does not have."""
 OWN_WORDS = {
     "fc": "Coulomb torque", "fs": "static (break-away) torque", "fs_positive": "break-away torque, v > 0",
     "stiffness": "stiffness at rest", "fs_negative": "break-away torque, v < 0",
@@ -202,7 +201,7 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
         out.append(f"the model misses {percent(sliding.relative)} of the torque even where the axis slides")
     if sliding is not None and beaten(sliding):
         out.append("plain least squares (--inverse) explains the torque better where the axis slides")
-    fall = next((found.misfit[k] for k in FALL_MISSING if k in found.misfit), 0.0)
+    fall = missing_fall(found.misfit)
     if fall > 0.0 and found.model is not None:
         out.append(
             f"friction falls by {quantity(fall, unit_in(found, 'N·m'))} with velocity, which law "

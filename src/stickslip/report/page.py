@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from stickslip.errors import InputError
+from stickslip.errors import unwritable
 from stickslip.report.plots import tied
 
 
@@ -36,10 +36,3 @@ def replaced(target: Path, html: str) -> Path:
     except OSError as error:
         raise unwritable(target, error) from None
     return target
-
-
-def unwritable(target: Path, error: OSError) -> InputError:
-    """What to tell of a file that cannot be written."""
-    return InputError(
-        f"cannot write {error.filename or target} ({error.strerror or error}); choose another place with --out"
-    )

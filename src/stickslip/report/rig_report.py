@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.errors import unwritable
 from stickslip.report.conclusions import rig_conclusion
 from stickslip.report.html import image
-from stickslip.report.page import filled, replaced, unwritable
+from stickslip.report.page import filled, replaced
 from stickslip.report.plots import REFERENCE, Curve, Panel, draw, envelope, style_of
 from stickslip.study.experiments import Experiment, ExperimentView, experiments_of
 from stickslip.study.result import Run, StudyResult

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.errors import InputError, unwritable
 from stickslip.record import Record
 from stickslip.study.provenance import engine_hash, file_hash, versions
 from stickslip.study.result import Run
@@ -51,11 +51,6 @@ def prepared_folder(folder: Path) -> Path:
     except OSError as error:
         raise unwritable(folder, error) from None
     return folder
-
-
-def unwritable(path: Path, error: OSError) -> InputError:
-    """The error that says that a path cannot be written, and why."""
-    return InputError(f"cannot write {path} ({error.strerror or error}); choose another place with --out")
 
 
 def claim_folder(folder: Path, name: str, kind: str = "study") -> Path:

@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.study.files import unwritable
+from stickslip.errors import InputError, unwritable
 from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.block import Block
 from stickslip.sweep.plan import BLOCK, Sweep

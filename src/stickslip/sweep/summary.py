@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.study.files import KEYS, unwritable
+from stickslip.errors import unwritable
+from stickslip.study.files import KEYS
 from stickslip.sweep.dataset import read
 from stickslip.sweep.plan import Sweep
 

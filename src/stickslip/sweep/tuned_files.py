@@ -7,7 +7,7 @@ import json
 import os
 from pathlib import Path
 
-from stickslip.study.files import unwritable
+from stickslip.errors import unwritable
 from stickslip.sweep.plan import Sweep
 from stickslip.sweep.tune import Tuned
 

@@ -17,7 +17,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.linear import Gains
 from stickslip.control.recommended import Recommended, recommended_in
-from stickslip.errors import InputError
+from stickslip.errors import InputError, unwritable
 from stickslip.export import CONTROLLER_TARGETS, TARGETS, controller_target, target_named
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.maps import MAP_TARGETS, MapTarget, map_target, written
@@ -27,7 +27,7 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 from stickslip.rules import with_article
 from stickslip.spec import Surroundings
-from stickslip.study.files import prepared_folder, unwritable
+from stickslip.study.files import prepared_folder
 from stickslip.study.study import load_run
 from stickslip.verbs import own_files
 from stickslip.verbs.export_maps import map_in, only_map
@@ -88,17 +88,15 @@ class ExportResult:
             If a file cannot be written.
         """
         prepared_folder(Path(folder))
-        made: list[Path] = []
-        for name, content in self.files.items():
-            path = Path(folder) / name
+        paths = tuple(Path(folder) / name for name in self.files)
+        for path, content in zip(paths, self.files.values(), strict=True):
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(content if isinstance(content, bytes) else content.encode())
             except OSError as error:
                 raise unwritable(path, error) from None
-            made.append(path)
-        own_files.written(made)
-        return replace(self, paths=tuple(made))
+        own_files.written(paths)
+        return replace(self, paths=paths)
 
     def __str__(self) -> str:
         lines = [f"{self.target.title}:", *(f"  {path}" for path in self.paths or self.files)]

@@ -19,7 +19,7 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.learning import TimeTable, low_pass
 from stickslip.control.written import tables_of
-from stickslip.errors import InputError
+from stickslip.errors import InputError, unwritable
 from stickslip.machines.drivetrain import Drivetrain
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
@@ -28,7 +28,7 @@ from stickslip.record import Record
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, replay
 from stickslip.spec import Surroundings
-from stickslip.study.files import prepared_folder, unwritable
+from stickslip.study.files import prepared_folder
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LARGEST = 1e6

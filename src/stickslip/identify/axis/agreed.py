@@ -16,7 +16,7 @@ import numpy as np
 
 from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
-from stickslip.identify.axis.falling import FALL, SAME, fall_together, moved_apart, told, with_rest
+from stickslip.identify.axis.falling import FALL, SAME, fall_together, told, with_rest, with_timing
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.axis.settled import ALONE, APART, TWO_METHODS
 from stickslip.identify.estimate import Estimate
@@ -190,7 +190,7 @@ def agreed(
             continue
         if found.each_way:
             # Certain sliding has one fall for both directions.
-            taken[e.name] = moved_apart(e, parameters[e.name], held=held)
+            taken[e.name] = with_timing(e, parameters[e.name], held=held)
         else:
             taken[e.name], said = fall_together(e, found, parameters[e.name], exponent_of(vector), held=held)
             notes += said

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from stickslip.identify.estimate import Estimate
@@ -50,7 +50,7 @@ def fall_together(
         )
         value = own.value if found.shows_a_fall else e.value
         e = told(e, p, value, min(e.lower, own.value), max(e.upper, own.value), math.nan)
-    return moved_apart(e, p, held=held), notes
+    return with_timing(e, p, held=held), notes
 
 
 def number_of(name: str, found: Regression, exponent: float | None) -> Number | None:
@@ -93,10 +93,15 @@ def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale
     return replace(e, value=value, std=std, lower=low, upper=high, identified=not why, verdict=why)
 
 
-def moved_apart(e: Estimate, p: Parameter, *, held: bool) -> Estimate:
+def with_timing(e: Estimate, p: Parameter, *, held: bool) -> Estimate:
     """Fs or vs in one direction by the prediction error alone, as unsure as a moved torque and the law's form make
     it."""
     return widened(e, p, 1.0 if held else MOVED) if e.identified else e
+
+
+def missing_fall(misfit: Mapping[str, float]) -> float:
+    """By how much friction falls with velocity where the law has no fall, N·m (N); 0 where it misses none."""
+    return next((misfit[k] for k in ("fall_missing_Nm", "fall_missing_N") if k in misfit), 0.0)
 
 
 def half_width(e: Estimate) -> float:

@@ -14,7 +14,7 @@ from stickslip.identify.axis.agreed import TOLD_BY_SLIDING
 from stickslip.identify.axis.choice import (
     Candidate,
 )  # fmt: skip
-from stickslip.identify.axis.falling import with_rest
+from stickslip.identify.axis.falling import number_of, with_rest
 from stickslip.identify.axis.gravity import within_a_turn
 from stickslip.identify.axis.load_check import ADVICE, judged_load
 from stickslip.identify.axis.loop_check import doubted_loops
@@ -26,6 +26,7 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import told_by
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.monte_carlo import sliding_torque
+from stickslip.identify.regression.bands import GAUSSIAN
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
@@ -48,8 +49,6 @@ HELD_BY_FRICTION = (
     "the axis slides both ways"
 )
 STRIBECK = ("fs", "vs", "delta_s")
-GAUSSIAN = 2.0
-"""Exponent with which friction falls where nobody named one."""
 LOOP_OFF = 0.3
 """Relative error of the simulated loop's drive signal from which on its gains are doubted."""
 
@@ -112,8 +111,8 @@ def left_where_it_slides(sliding: Regression, model: Model, mechanics: Mechanics
     out = {"sliding_rms_Nm": float(np.sqrt(np.mean(left**2)))}
     if sliding.shows_a_fall and told_whole(model.law):
         fall = sliding.numbers["fs"].value - sliding.numbers["fc"].value
-        velocity = sliding.falling.get(GAUSSIAN, (0.0, sliding.vs))[1].value
-        out |= {"fall_missing_Nm": fall, "fall_missing_velocity": velocity}
+        velocity = number_of("vs", sliding, GAUSSIAN[0]) or sliding.vs
+        out |= {"fall_missing_Nm": fall, "fall_missing_velocity": velocity.value}
     return out
 
 
@@ -143,10 +142,8 @@ def evident(
         by_name = {e.name: e for e in out}
         rest, level = (by_name[n + way].value if n + way in by_name else math.nan for n in ("fs", "fc"))
         if rest <= level:
-            why, fall = (
-                f"no fall of friction with velocity shows: fs{way} is not above fc{way}",
-                {n + way for n in STRIBECK},
-            )
+            why = f"no fall of friction with velocity shows: fs{way} is not above fc{way}"
+            fall = {n + way for n in STRIBECK}
             out = [replace(e, identified=False, verdict=why) if e.name in fall else e for e in out]
         if rest <= level or (rest > largest and level <= largest):
             # No model is to hold a friction at rest that nothing moved against.

@@ -212,8 +212,7 @@ class Regression:
         if self.unexplained_by(self.own) > BEYOND * level:
             return BEYOND_LEVEL
         swings = self.numbers.keys() >= ROTATED and np.ptp(stacked(self.rows, "position")) >= SWUNG
-        unseen = ("inertia", *sorted(ROTATED))
-        return UNMOVED if swings and not any(self.above_chance(n) for n in unseen) else ""
+        return UNMOVED if swings and not any(map(self.above_chance, ("inertia", *ROTATED))) else ""
 
     def confirmed(self, name: str) -> bool:
         """Whether more than one band of frequencies tells a number, whatever the skews they were fitted with.
