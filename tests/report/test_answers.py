@@ -231,6 +231,7 @@ def test_a_linear_axis_has_force_and_mass() -> None:
     assert (words["inertia"], words["fc"]) == ("mass", "Coulomb force")
     assert symbol("sigma_2") == ("σ", "2")
     assert symbol("J") == ("J", "")
+    assert symbol("F_C^-") == ("F", "C⁻")
 
 
 def test_counts_are_those_of_an_encoder() -> None:

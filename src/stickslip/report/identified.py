@@ -234,9 +234,9 @@ def shown(e: Estimate, meaning: str = "") -> dict[str, Any]:
 
 
 def symbol(text: str) -> tuple[str, str]:
-    """A symbol in letters of the field, and its index: sigma_2 as σ and 2."""
+    """A symbol in letters of the field, and its index: sigma_2 as σ and 2, and F_C^-, of v < 0, as F and C⁻."""
     base, _, index = text.partition("_")
-    return GREEK.get(base, base), index
+    return GREEK.get(base, base), index.replace("^-", "⁻")
 
 
 def source(s: Source) -> dict[str, Any]:
