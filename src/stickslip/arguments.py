@@ -10,12 +10,12 @@ import dataclasses
 import functools
 import inspect
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain, repeat
 from typing import Any, ParamSpec, TypeVar, cast
 
 from stickslip.errors import ParameterError, StickslipError, UnknownName
-from stickslip.in_python import in_python
+from stickslip.in_python import SIGNALS, in_python
 from stickslip.rules import Rule, Wrong, rule_of
 
 EXAMPLES = {
@@ -119,6 +119,47 @@ def constructor_checked(kind: type[T]) -> type[T]:
     return kind
 
 
+def constructor_named(kind: type[T]) -> type[T]:
+    """A class whose constructor says in a line what is missing or unknown; kinds of its values it looks at itself."""
+    inner: Any = vars(kind)["__init__"]
+    signature = inspect.signature(inner)
+    names = [name for name in signature.parameters if name != "self"]
+
+    @functools.wraps(inner)
+    def checked(self: Any, *args: Any, **kwargs: Any) -> None:
+        try:
+            inner(self, *args, **kwargs)
+        except TypeError:
+            refuse_call(kind.__name__, names, signature, (self, *args), kwargs)
+            raise
+
+    setattr(kind, "__init__", checked)  # noqa: B010
+    return kind
+
+
+def refuse_call(
+    owner: str, names: Sequence[str], signature: inspect.Signature, args: Sequence[Any], kwargs: Mapping[str, Any],
+) -> None:  # fmt: skip
+    """Refuse a call without what must be given, with too much, or with what there is none of; else return.
+
+    Raises
+    ------
+    UnknownName, ParameterError
+    """
+    try:
+        signature.bind(*args, **kwargs)
+    except TypeError as error:
+        for name in kwargs:
+            if name not in signature.parameters:
+                raise unknown_argument(owner, name, names) from None
+        raise ParameterError(f"{owner}: {error}; its arguments are {', '.join(names)}") from None
+
+
+def unknown_argument(owner: str, name: str, names: Sequence[str]) -> UnknownName:
+    """The error that names what is meant: a channel's name stands for the argument of its signal."""
+    return UnknownName(f"argument of {owner}", name, names, meant=SIGNALS.get(name, ""))
+
+
 def arguments_checked(function: Callable[P, R], module: str = "") -> Callable[P, R]:
     """A function that refuses what its annotations do not allow; its errors speak of arguments, not of options.
 
@@ -151,7 +192,7 @@ def arguments_checked(function: Callable[P, R], module: str = "") -> Callable[P,
                     if rule.make is int and value is not None:
                         made[own] = int(cast("Any", value))
                 elif takes.closed and own not in takes.names:
-                    raise UnknownName(f"argument of {owner}", own, takes.listed)
+                    raise unknown_argument(owner, own, takes.listed)
             if made:
                 call: Any = function
                 return call(
@@ -160,7 +201,7 @@ def arguments_checked(function: Callable[P, R], module: str = "") -> Callable[P,
                 )
             return function(*args, **kwargs)
         except TypeError:
-            takes.refuse_call(signature, args, kwargs)
+            refuse_call(owner, takes.listed, signature, args, kwargs)
             raise
         except StickslipError as error:
             words = in_python(str(error), owner, not takes.signals.isdisjoint(kwargs))
@@ -219,20 +260,6 @@ class Accepted:
     def listed(self) -> list[str]:
         """Names of arguments, without what a method is called on."""
         return sorted(self.names - {"self", "cls", "_cls"})
-
-    def refuse_call(self, signature: inspect.Signature, args: Any, kwargs: Any) -> None:
-        """Refuse a call without what must be given, or with too much.
-
-        Raises
-        ------
-        ParameterError
-        """
-        try:
-            signature.bind(*args, **kwargs)
-        except TypeError as error:
-            raise ParameterError(
-                f"{self.owner}: {error}; its arguments are {', '.join(self.listed)}"
-            ) from None
 
 
 def written(kind: Any) -> dict[str, Any]:

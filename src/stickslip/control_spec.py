@@ -36,7 +36,7 @@ from dataclasses import dataclass, field
 from dataclasses import fields as dataclass_fields
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import constructor_named, insist_on_own
 from stickslip.binding import bound, first_complaint
 from stickslip.errors import LawError
 from stickslip.spec import Choice, Configurable, Field, Law, Par, fields_of
@@ -90,6 +90,7 @@ def friction_steady(v: float, p: Any) -> float:
     return 0.0
 
 
+@constructor_named
 @dataclass(frozen=True, eq=False, repr=False)
 class ControlLaw(Configurable):
     """A control law (see the module's docstring for its functions and their arguments).

@@ -10,10 +10,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import constructor_named, insist_on_own
 from stickslip.errors import LawError
 
 
+@constructor_named
 @dataclass(frozen=True, slots=True)
 class Par:
     """What a number means: its unit, symbol, meaning and bounds (``lower``, ``upper``, included).

@@ -72,11 +72,12 @@ class ParameterError(InputError):
 
 
 class UnknownName(InputError):
-    """A name that is not registered in its family."""
+    """A name that is not registered in its family; `meant`, if it is one of the known, is what it stands for."""
 
-    def __init__(self, family: str, name: object, known: Iterable[str]) -> None:
+    def __init__(self, family: str, name: object, known: Iterable[str], meant: str = "") -> None:
         names = sorted(known)
-        super().__init__(f"unknown {family} {name!r}; {suggestion(str(name), names)}")
+        remedy = f"did you mean {meant!r}?" if meant in names else suggestion(str(name), names)
+        super().__init__(f"unknown {family} {name!r}; {remedy}")
 
 
 class ModelRemark(UserWarning):
@@ -189,4 +190,7 @@ def suggestion(name: str, known: Iterable[str], otherwise: str = "") -> str:
 
 def unwritable(path: Path, error: OSError) -> InputError:
     """The error that says that a path cannot be written, and why."""
-    return InputError(f"cannot write {path} ({error.strerror or error}); choose another place with --out")
+    why = error.strerror or str(error)
+    if isinstance(error, FileExistsError | NotADirectoryError):
+        why = "a file is where a folder is needed"
+    return InputError(f"cannot write {path} ({why}); choose another place with --out")

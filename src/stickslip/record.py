@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from stickslip.arguments import arguments_checked, insist_on_own
+from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
 from stickslip.errors import InputError, suggestion, unwritable
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
+@constructor_named
 @dataclass(frozen=True, eq=False)
 class Record:
     """Channels over time, with their units and where they come from.

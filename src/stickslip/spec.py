@@ -41,7 +41,7 @@ from dataclasses import dataclass, field
 from dataclasses import fields as dataclass_fields
 from typing import Any, ClassVar
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import constructor_named, insist_on_own
 from stickslip.binding import bound, distinct, first_complaint, least, wrapped
 from stickslip.configurable import Configurable, Described
 from stickslip.description import (
@@ -118,6 +118,7 @@ class ReferenceKind(Described):
         object.__setattr__(self, "Parameters", self.Params)
 
 
+@constructor_named
 @dataclass(frozen=True, eq=False, repr=False)
 class Law(Configurable):
     """A friction law (see the module's docstring for its functions and their arguments).

@@ -272,5 +272,20 @@ def test_every_function_class_and_method_is_among_them() -> None:
 )
 def test_an_unknown_argument_is_refused_with_those_that_there_are(name: str) -> None:
     call = CALLS[name]
-    with pytest.raises((ss.InputError, TypeError), match="speling"):
+    with pytest.raises(ss.InputError, match="speling"):
         call.function(*call.first, **call.given, speling=1)
+
+
+def test_a_channels_name_stands_for_the_argument_of_its_signal() -> None:
+    with pytest.raises(ss.InputError, match="'position_reference'; did you mean 'reference'"):
+        ss.identify(t=T, position_reference=T)
+    with pytest.raises(ss.InputError, match="'time'; did you mean 't'"):
+        ss.doctor(time=T)
+
+
+@pytest.mark.parametrize(
+    ("kind", "missing"), [(ss.RigidAxis, "inertia"), (ss.Feedback, "model"), (ss.Machine, "name")]
+)
+def test_what_a_constructor_must_be_given_is_named(kind: type, missing: str) -> None:
+    with pytest.raises(ss.InputError, match=f"{kind.__name__}: missing a required argument: '{missing}'"):
+        kind()

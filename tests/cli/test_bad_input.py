@@ -174,17 +174,19 @@ def test_reference_table(folder: Path, capsys: pytest.CaptureFixture[str], row: 
     ("argv", "named"),
     [
         ([], "no verb"),
-        (["studdy"], "studdy"),
+        (["studdy"], "unknown verb 'studdy'; did you mean 'study'?"),
         (["study"], "STUDY"),
         (["study", "thesys"], "thesis"),
         (["study", "nowhere.toml"], "nowhere.toml"),
         (["study", "."], "."),
-        (["study", "thesis", "--jobs", "0"], "jobs = 0"),
+        (["study", "thesis", "--jobs", "0"], "--jobs 0 must"),
         (["study", "thesis", "--jobs", "many"], "many"),
         (["study", "thesis", "--only", "lo"], "'low'"),
         (["study", "thesis", "--only", "low,,step"], "empty"),
         (["study", "thesis", "--only", "FF-lugr"], "'FF-lugre'"),
-        (["study", "thesis", "--outt", "x"], "--outt"),
+        (["study", "thesis", "--outt", "x"], "`stickslip study` has no option --outt; did you mean --out?"),
+        (["study", "thesis", "--zz"], "has no option --zz; see `stickslip study --help`"),
+        (["identify", "motion.csv", "--torque-constant", "-1"], "--torque-constant -1 must be greater than 0"),
         (["law", "lugree"], "'lugre'"),
         (["law", "nowhere.py"], "nowhere.py"),
         (["simulate", "nowhere.toml"], "nowhere.toml"),
@@ -211,6 +213,7 @@ def test_output_that_cannot_be_written(folder: Path, capsys: pytest.CaptureFixtu
     line = complaint(capsys, "study", folder / "small_study.toml", "--out", folder / place)
     assert str(folder / place) in line
     assert "--out" in line
+    assert ("a file is where a folder is needed" in line) is place.startswith("motion.csv")
     assert (folder / "motion.csv").read_text() == before
 
 

@@ -73,7 +73,7 @@ def test_a_filter_above_half_the_sample_rate_is_refused(model, capsys):
     call = ["export", model, "--to", "c99", "--compensator", "fb", "--filter-hz", "600"]
     assert main(call) == 2
     said = capsys.readouterr().err
-    assert "filter_hz = 600 Hz" in said
+    assert "--filter-hz 600 Hz" in said
     assert "at most 495 Hz" in said
 
 
@@ -92,7 +92,7 @@ def test_the_inertia_comes_from_the_models_file(model, tmp_path):
         (["--to", "python", "--single"], "one precision"),
         (["--to", "urdf", "--controller"], "law alone"),
         (["--to", "urdf", "--compensator", "ff"], "law alone"),
-        (["--to", "c99", "--compensator", "fb", "--filter-hz", "0"], "filter_hz"),
+        (["--to", "c99", "--compensator", "fb", "--filter-hz", "0"], "--filter-hz"),
         (["--to", "c99", "--compensator", "fb", "--sample-time", "0"], "sample_time"),
         (["--to", "c99", "--filter-hz", "10"], "--compensator"),
         (["--to", "c99", "--gain", "0.9"], "--compensator"),

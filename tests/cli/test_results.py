@@ -118,7 +118,7 @@ def test_a_negative_gain_is_not_exported(tmp_path: Path, capsys: pytest.CaptureF
     model, out = written(tmp_path / "m.toml"), tmp_path / "out"
     asked = ["export", str(model), "--to", "c99", "--compensator", "ff", "--gain", "-1", "--out", str(out)]
     assert main(asked) == 2
-    assert "gain = -1 must be at least 0" in capsys.readouterr().err
+    assert "--gain -1 must be at least 0" in capsys.readouterr().err
     assert not out.exists()
 
 

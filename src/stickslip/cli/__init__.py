@@ -10,6 +10,7 @@ import argparse
 import gc
 import importlib
 import os
+import re
 import sys
 import warnings
 from collections.abc import Generator, Mapping, Sequence
@@ -18,7 +19,7 @@ from typing import Any, NoReturn
 
 from stickslip import compiling, waiting
 from stickslip.approval import allow_code
-from stickslip.errors import InputError, Interrupted, ModelRemark, StickslipError
+from stickslip.errors import InputError, Interrupted, ModelRemark, StickslipError, suggestion
 from stickslip.in_python import with_options
 from stickslip.verbs.kinds import require
 
@@ -58,12 +59,26 @@ WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 they are read."""
 
 
+OPTION = re.compile(r"--([a-z][a-z-]*)")
+
+
 class Parser(argparse.ArgumentParser):
     """An argument parser that complains in one line."""
 
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing the usage."""
         raise InputError(f"{message}; see `{self.prog} --help`")
+
+    def parse_known_args(self, *args: Any, **named: Any) -> Any:
+        """Parse; an option that the verb does not have is named with the nearest that it has."""
+        known, rest = super().parse_known_args(*args, **named)
+        for word in rest:
+            if word.startswith("--"):
+                name, own = word.partition("=")[0].removeprefix("--"), OPTION.findall(self.format_usage())
+                remedy = suggestion(name, own, f"see `{self.prog} --help`")
+                near = re.sub("'(.*?)'", r"--\1", remedy)
+                raise InputError(f"`{self.prog}` has no option --{name}; {near}")
+        return known, rest
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -78,11 +93,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             warnings.filterwarnings("ignore", category=RuntimeWarning)
         compiling.listen(notice)
         waiting.listen(_tell)
+    given = list(sys.argv[1:] if argv is None else argv)
     try:
         with with_options():
-            return _dispatch(list(sys.argv[1:] if argv is None else argv))
+            return _dispatch(given)
     except InputError as error:
-        return _complain(error, 2)
+        return _complain(as_given(str(error), given), 2)
     except Interrupted as error:
         return _complain(error, 130)
     except StickslipError as error:
@@ -146,6 +162,8 @@ def allow_code_argument(parser: argparse.ArgumentParser) -> None:
 
 def _dispatch(argv: list[str]) -> int:
     # Only the verb that is called is imported; all of them where help or a complaint lists them.
+    if argv and not argv[0].startswith("-") and argv[0] not in VERBS:
+        raise InputError(f"unknown verb {argv[0]!r}; {suggestion(argv[0], VERBS)}")
     parser = parser_of(argv[:1] if argv and argv[0] in VERBS else VERBS)
     try:
         args: Any = parser.parse_args(argv)
@@ -194,6 +212,13 @@ def _remarks() -> Generator[None]:
 
         warnings.showwarning = show
         yield
+
+
+def as_given(message: str, argv: Sequence[str]) -> str:
+    """A message that names as an option, ``--torque-constant -1``, the value that was given by one."""
+    for option in {found[1] for word in argv if (found := OPTION.match(word))}:
+        message = re.sub(rf"(?<![\w.-]){option.replace('-', '_')} = ", f"--{option} ", message)
+    return message
 
 
 def _complain(what: object, code: int) -> int:

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import constructor_named, insist_on_own
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
@@ -97,6 +97,7 @@ class Compensator:
         return {"kind": self.name, **own, **self.model.as_dict()}
 
 
+@constructor_named
 @dataclass(frozen=True)
 class Feedforward(Compensator):
     """T_hat = gain * law(reference velocity). Its state depends on time alone.
@@ -130,6 +131,7 @@ class Feedforward(Compensator):
     velocity: ClassVar[str] = "reference"
 
 
+@constructor_named
 @dataclass(frozen=True)
 class Feedback(Compensator):
     """T_hat = gain * law(measured velocity).

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, cast
 
-from stickslip.arguments import arguments_checked, insist_on_own
+from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
 from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Compensator
 from stickslip.control.composed import Composed
@@ -24,6 +24,7 @@ MANY = ("feedforward", "observer", "loop")
 """Places in which several laws may stand; their torques are summed."""
 
 
+@constructor_named
 @dataclass(frozen=True, init=False)
 class Controller(Composed):
     """A controller that acts every sample time and holds its torque in between, or in continuous time.

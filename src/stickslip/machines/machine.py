@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
-from stickslip.arguments import arguments_checked, insist_on_own
+from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
 from stickslip.errors import ParameterError, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
@@ -34,6 +34,7 @@ class Sensor:
 SILENT = Sensor()
 
 
+@constructor_named
 @dataclass(frozen=True)
 class Machine:
     """A virtual machine.

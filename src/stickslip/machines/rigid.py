@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import constructor_named, insist_on_own
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 
 
+@constructor_named
 @dataclass(frozen=True)
 class RigidAxis:
     """One inertia with friction.
