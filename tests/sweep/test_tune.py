@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
+from stickslip.cli import tune as help_of_tune
 from stickslip.errors import ConfigError, InputError
 from stickslip.sweep import tune as tuning
 from stickslip.sweep.block import measured
@@ -19,6 +20,20 @@ SMALL = Path(__file__).with_name("small_tune.toml")
 def found():
     sweep = load(SMALL)
     return sweep, tuning.tune(sweep, sweep.runs[0])
+
+
+def test_what_the_help_shows_is_a_sweep_that_can_be_tuned(tmp_path, capsys):
+    shown = [line[4:] for line in help_of_tune.__doc__.splitlines() if line.startswith("    ")][1:]
+    changed, tables = shown[: shown.index("percentile = 95") + 1], shown[shown.index("percentile = 95") + 1 :]
+    names = {line.split(" = ")[0] for line in changed}
+    assert main(["sweep", "thesis-robustness", "--print"]) == 0
+    kept = [x for x in capsys.readouterr().out.splitlines() if x.split(" = ")[0] not in names]
+    file = tmp_path / "my.toml"
+    file.write_text("\n".join([*changed, *kept, *tables]), encoding="utf-8")
+    sweep = load(file)
+    assert [s.name for s in sweep.tuned] == ["controller.bandwidth_hz", "controller.gain"]
+    assert [r.key for r in sweep.runs] == ["signed/low/nominal/FF-gms"]
+    assert sweep.drawn.cases <= tuning.MOST_CASES
 
 
 def score(sweep, settings):

@@ -2,9 +2,13 @@
 
     stickslip tune my.toml
 
-The file is that of a sweep (`stickslip sweep thesis-robustness --print`) plus a table of the settings to tune:
+The file is that of a sweep (`stickslip sweep thesis-robustness --print > my.toml`) with few cases, the runs to tune,
+and tables of the settings at its end:
 
+    only = ["signed", "low", "nominal", "FF-gms"]
+    cases = 64                # every setting runs all of them
     percentile = 95
+
     [tune."controller.bandwidth_hz"]
     range = [10.0, 60.0]
     [tune."controller.gain"]
