@@ -186,7 +186,10 @@ def test_reference_table(folder: Path, capsys: pytest.CaptureFixture[str], row: 
         (["study", "thesis", "--only", "FF-lugr"], "'FF-lugre'"),
         (["study", "thesis", "--outt", "x"], "`stickslip study` has no option --outt; did you mean --out?"),
         (["study", "thesis", "--zz"], "has no option --zz; see `stickslip study --help`"),
-        (["identify", "motion.csv", "--torque-constant", "-1"], "--torque-constant -1 must be greater than 0"),
+        (
+            ["identify", "motion.csv", "--torque-constant", "-1"],
+            "--torque-constant -1 must be greater than 0",
+        ),
         (["law", "lugree"], "'lugre'"),
         (["law", "nowhere.py"], "nowhere.py"),
         (["simulate", "nowhere.toml"], "nowhere.toml"),

@@ -163,6 +163,23 @@ def test_a_unit_that_nobody_knows_is_named(
     )
 
 
+def test_columns_that_are_not_used_are_listed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    more = (f"foo{i}" for i in range(10))
+    table = np.column_stack((T, Q, TORQUE, *(np.ones_like(T) for _ in range(10))))
+    np.savetxt("wide.csv", table, "%.9g", ",", header=",".join((HEAD, *more)), comments="")
+    assert main(["doctor", "wide.csv"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert f"not used: {', '.join(repr(f'foo{i}') for i in range(8))} and 2 more" in said
+    assert main(["doctor", "wide.csv", "--map", "velocity=foo3:rad/s", "--accept", "velocity-scale"]) in (
+        0,
+        2,
+    )
+    assert "'foo3'" not in next(x for x in capsys.readouterr().out.splitlines() if x.startswith("not used"))
+
+
 @pytest.mark.parametrize(
     ("verb", "file", "is_a", "verbs"),
     [

@@ -111,6 +111,10 @@ def reading_of(args: argparse.Namespace) -> Reading:
     return out
 
 
+SHOWN = 8
+"""Columns that are named where they are not used"""
+
+
 def print_columns(opened: Opened) -> None:
     """The table of channels, columns, units, and who says so."""
     record = opened.record
@@ -135,6 +139,9 @@ def print_columns(opened: Opened) -> None:
     widths = [max(len(r[i]) for r in [head, *rows]) for i in range(4)]
     for line in (head, *rows):
         print("  ".join(f"{cell:<{width}}" for cell, width in zip(line, [*widths, 0], strict=True)).rstrip())
+    if unused := [repr(name) for name in reading["unused"]]:
+        more = f" and {len(unused) - SHOWN} more" if len(unused) > SHOWN else ""
+        print(f"not used: {', '.join(unused[:SHOWN])}{more}")
     span = float(record.time[-1]) - float(record.time[0]) if len(record) > 1 else math.inf
     rate = f", {len(record)} rows" + (f" over {span:.4g} s" if math.isfinite(span) else "")
     print(f"{reading['file']}: {reading['format']}{rate}")

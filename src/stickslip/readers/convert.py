@@ -137,6 +137,7 @@ def convert(
     reading = {
         "format": table.format,
         "columns": listed,
+        "unused": [name for name in columns if name not in {c["column"] for c in listed}],
         "constants": dict(table.constants),
         "drive": drive.known(),
         "time_origin": origin,

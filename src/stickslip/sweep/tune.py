@@ -114,7 +114,9 @@ def tune(sweep: Sweep, run: PlannedRun, progress: Callable[[int, int], None] | N
             f'run {run.key} has none of the numbers to tune; give [tune."controller.bandwidth_hz"]'
         )
     if sweep.drawn.cases > MOST_CASES:
-        raise InputError(f"cases = {sweep.drawn.cases} are too many for every setting; give {MOST_CASES} at most")
+        raise InputError(
+            f"cases = {sweep.drawn.cases} are too many for every setting; give {MOST_CASES} at most"
+        )
     uncertain = sweep.values(run, sweep.drawn.block(0, sweep.drawn.cases))
     bases = [value_of(run, s.name) if s.factor else 1.0 for s in spreads]
     tried, scores = list[Array](), list[Array]()

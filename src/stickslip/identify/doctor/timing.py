@@ -96,7 +96,7 @@ def sampling(view: View) -> Iterator[Finding]:
             "gap",
             message,
             row(int(rows[longest]), view),
-            f"filters would smear what lies on both sides of a gap: identify with --to {end:.6g}, or --from {begin:.6g}",
+            f"filters smear what lies on both sides of a gap: identify with --to {end:.6g}, or --from {begin:.6g}",
         )
     # A run may end between two samples.
     whole = steps[:-1] if steps[-1] < usual else steps
