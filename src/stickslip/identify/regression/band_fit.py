@@ -44,7 +44,7 @@ TENSION, FAR = (
     6.0,
 )  # standard deviations: viscous friction below 0 at most; above 0, where the bound does nothing
 MEMORY = 3.0  # rows over which it is correlated at least
-MOVES = 0.3  # of a torque over the position, by which it moves what accelerates where its orders are not told apart
+MOVES = 0.35  # of a torque over the position, by which it moves what accelerates where its orders are not told apart
 
 
 @dataclass(frozen=True, slots=True)
