@@ -238,7 +238,7 @@ def test_errors_stop_with_exit_code_2(tmp_path, capsys, monkeypatch):
         (["--map", "position=x"], "no column 'x'"),
         (["--map", "position"], "must be CHANNEL"),
         (["--map", "position=position [rad]:Nm"], "unit of torque"),
-        (["--gear-ratio", "0"], "gear_ratio = 0"),
+        (["--gear-ratio", "0"], "--gear-ratio 0"),
         (["--profile", str(tmp_path)], "cannot be read"),
         (["--sample-time", "-1"], "sample_time = -1"),
         (["--stribeck-velocity", "0"], "greater than 0"),

@@ -145,6 +145,7 @@ position_map, load, intervals, robust
         kind = method_named("hysteresis")
         why = "the friction itself is recorded, and no torque of a drive"
         tell(f"{why}: --method hysteresis is taken, a law along the motion")
+    kind.refuse_unknown(options)
     kind.check(records, options)
     tell_warnings(sources, tell)
     progress(f"method {kind.name}, {sum(len(r) for r in records)} samples")

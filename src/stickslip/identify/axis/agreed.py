@@ -370,6 +370,8 @@ def held_together(
     if not apart or abs(value - e.value) <= SAME * max(abs(e.value), scale if math.isfinite(scale) else 0.0):
         return e, []
     wide = told(e, p, e.value, min(e.lower, value), max(e.upper, value), scale)
+    if not wide.lower <= value <= wide.upper:
+        return wide, []  # it cannot be
     return wide, [
         f"{e.name}: the plain inverse dynamics, reversals included, says {value:.4g}, certain sliding {e.value:.4g} "
         f"{e.unit}; the interval holds both."

@@ -24,6 +24,12 @@ MOVED, UNLIKE = 1.3, 0.01
 are then blurred by a part of a row; and the half-width, in parts of the value, that no law's form is true to."""
 NARROW, FORM = 1.6, 0.02
 """Factor on certain sliding's standard deviation of these, and the part of the value that its form is true to."""
+LEAST = 1e-12
+"""Of an interval's end: what stands for 0 where a parameter must be greater."""
+BELOW = (
+    "the torque asks for {value:.3g} {unit} ({high:.3g} at most), and it cannot be below 0: the columns do not belong "
+    "together (a torque or velocity that comes late), or something else moves the axis"
+)
 AT_REST = "extrapolated to rest: at which velocity friction falls to its level is not told"
 
 
@@ -85,9 +91,16 @@ def with_rest(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
 
 
 def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale: float) -> Estimate:
-    """An estimate with another value and interval, judged by the same rules, within the parameter's bounds."""
+    """An estimate with another value and interval, judged by the same rules, within the parameter's bounds.
+
+    Where the whole interval lies below 0 and the parameter may not, it says nothing: the model is wrong there.
+    """
     std = (high - low) / (2.0 * QUANTILE)
-    least = p.par.lower if not p.par.positive else max(p.par.lower, 1e-12 * abs(high))
+    least = p.par.lower if not p.par.positive else max(p.par.lower, LEAST * abs(high))
+    if p.nonnegative and high <= 0.0:
+        why = BELOW.format(value=value, high=high, unit=p.par.unit)
+        least = max(least, LEAST * abs(low)) if p.par.positive else least
+        return replace(e, value=least, std=std, lower=least, upper=-low, identified=False, verdict=why)
     value, low, high = (min(max(x, least), p.par.upper) for x in (value, low, high))
     why = verdict_on(p, value, low, high, Noise(1.0, "residual", math.inf), scale)
     return replace(e, value=value, std=std, lower=low, upper=high, identified=not why, verdict=why)

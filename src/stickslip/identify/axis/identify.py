@@ -9,6 +9,7 @@ without the drive's signal are fitted by the output error (`stickslip.identify.a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
@@ -29,6 +30,7 @@ from stickslip.identify.axis.law_fit import Evidence, against_sliding, estimated
 from stickslip.identify.axis.output import judged
 from stickslip.identify.axis.result import assembled, narrow_note, noted
 from stickslip.identify.axis.search import Asked, Extras, fitted_axis, require_start
+from stickslip.identify.axis.settled import ALIKE
 from stickslip.identify.estimate import Estimate, Identification, silent
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
@@ -45,6 +47,10 @@ SIMPLEST = (
     "Law '{simplest}' is given instead of '{law}', which may predict reversals and standstills better: of its "
     "additional parameters ({more}) the record determines none, and no fall of friction with velocity shows where the "
     "axis slides."
+)
+CLOSER = (
+    "Law '{simplest}' is given instead of '{law}', which leaves more of the torque than plain least squares "
+    "do: of its additional parameters ({more}) the record does not determine all."
 )
 SLOWEST = 0.25
 """s between two samples, from which on a record says nothing of an axis's dynamics."""
@@ -151,8 +157,12 @@ def identify_axis(
     if intervals == "prediction":
         try:
             found = estimated(chosen, own, evidence, notes)
-            if automatic and not per_direction and nothing_more(found, {*free, *frozen, *given.values}):
-                return simplest_of(found, given, evidence, notes)
+            named = {*free, *frozen, *given.values}
+            if automatic and not per_direction and nothing_more(found, named):
+                return simplest_of(found, given, evidence, notes, SIMPLEST)
+            if automatic and not per_direction and leaves_more(found, named):
+                simpler = simplest_of(found, given, evidence, notes, CLOSER)
+                return simpler if ALIKE * of_torque(simpler) < of_torque(found) else found
             return found
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."
@@ -194,12 +204,12 @@ def refuse_a_weight(sliding: Regression | None, axis: ServoAxis) -> None:
 
 
 def simplest_of(
-    found: Identification, asked: Asked, evidence: Evidence, notes: Sequence[str]
+    found: Identification, asked: Asked, evidence: Evidence, notes: Sequence[str], why: str
 ) -> Identification:
-    """The simplest law in place of one whose additional parameters the record does not determine."""
+    """The simplest law in place of one whose additional parameters the record does not determine; `why` it is."""
     simplest, more = plugins.law(AUTOMATIC[0]), ", ".join(e.name for e in beside_sliding(found))
     assert found.model is not None
-    said = [*notes, SIMPLEST.format(law=found.model.law.name, simplest=simplest.name, more=more)]
+    said = [*notes, why.format(law=found.model.law.name, simplest=simplest.name, more=more)]
     return estimated(simplest, asked_of(simplest, asked, [simplest]), evidence, said)
 
 
@@ -258,6 +268,19 @@ def nothing_more(found: Identification, given: Set[str]) -> bool:
     estimates, more = {e.name: e for e in found.estimates}, beside_sliding(found)
     falls = "fs" in estimates and estimates["fs"].value > estimates["fc"].value
     return bool(more) and not (own_of(found) & given or any(e.identified for e in more) or falls)
+
+
+def leaves_more(found: Identification, given: Set[str]) -> bool:
+    """Whether a law, not all of whose own parameters the record determines, leaves more of its torque than plain least
+    squares do, which have none of them; what the user named (`given`) is never dropped."""
+    own, plain = of_torque(found), found.misfit.get("inverse_dynamics_relative", math.inf)
+    untold = not all(e.identified for e in beside_sliding(found))
+    return untold and own > ALIKE * plain and not own_of(found) & given
+
+
+def of_torque(found: Identification) -> float:
+    """Part of the record's torque that a model leaves unexplained."""
+    return found.misfit.get("force_relative", 0.0)
 
 
 def beside_sliding(found: Identification) -> list[Estimate]:

@@ -104,8 +104,7 @@ def by_sliding(
     experiments, axis = evidence.experiments, evidence.axis
     model = starting_models(experiments, law, inverse, asked.values)[0]
     vector, _ = laid_out(experiments, axis, law, inverse, model, asked)
-    level = abs(sliding.numbers["fc"].value)
-    scale = {p.name: 1.0 if p.par.unit == "rad" else level for p in vector.free}
+    scale = vector.signed_scale(sliding.friction)
     start = vector.values(vector.start)
     first = [
         Estimate(
@@ -232,8 +231,7 @@ def checked(result: PredictionError | Fitted, evidence: Evidence) -> tuple[tuple
     )
     estimates, u, said = result.estimates, result.u, list[str]()
     if sliding is not None:
-        level = abs(sliding.numbers["fc"].value)
-        scale = {p.name: 1.0 if p.par.unit == "rad" else level for p in result.vector.free}
+        scale = result.vector.signed_scale(sliding.friction)
         estimates, said = agreed(estimates, sliding, result.vector, inverse, scale)
         if not sliding.held_for(HELD):
             estimates = untold_by_reversals(estimates, result.model, sliding)

@@ -96,9 +96,10 @@ def axis_prediction(
     seen = watched(experiments, axis, asked)
     start = first or inverse_dynamics(experiments, axis)
     criterion, u = searched(experiments, axis, law, seen, start, asked, seed=seed)
+    vector, level = criterion.vector, abs(start.coulomb)
     return prediction_error(
-        seen.motions, law, criterion.vector, criterion.mechanics, inertia=criterion.vector.named(u)["inertia"],
-        friction=abs(start.coulomb), start=u, signed_scale=abs(start.coulomb), band=seen.band, seed=seed,
+        seen.motions, law, vector, criterion.mechanics, inertia=vector.named(u)["inertia"], friction=level, start=u,
+        signed_scale=vector.signed_scale(level), band=seen.band, seed=seed,
     )  # fmt: skip
 
 

@@ -35,6 +35,8 @@ ALIKE = 1.05
 """Times the force error of plain least squares up to which identified values stay where they are."""
 PREFERRED = 0.98
 """Times the force error without a fall of friction, that one which is not identified must stay below."""
+WORTH_A_WORD = 0.99
+"""Times the force error that moved values must stay below to be talked about."""
 QUANTILE = 1.96
 TIES, HALVINGS = (1e-6, 1e3), 40
 """Weights between which that is looked for which moves identified values least; halvings of that search."""
@@ -256,7 +258,10 @@ def settled(
             (moved, less), where = followed or (chosen, error), "within"
             notes = [] if followed else [KEPT]
         if less < error:
-            notes = [BEST_WITHIN.format(where=where, less=100.0 * less, before=100.0 * error)]
+            clearly = less < WORTH_A_WORD * error
+            notes = (
+                [BEST_WITHIN.format(where=where, less=100.0 * less, before=100.0 * error)] if clearly else []
+            )
             chosen, error, asked = moved, less, set(held)
     notes += made_by_a_controller(inverse, error)
     out = (placed(e, chosen, inverse, e.name in asked) for e in estimates)
@@ -356,7 +361,9 @@ def placed(e: Estimate, values: Mapping[str, float], inverse: InverseDynamics, a
     lower, upper = min(e.lower, value - half), max(e.upper, value + half)
     if e.name != "offset":
         lower = max(lower, 0.0)
-    told = half <= SHARE * values["fc"] if e.name == "offset" else lower > 0.0 and upper <= RATIO * lower
+    usual = float(np.median(np.abs(inverse.velocity[inverse.velocity != 0.0])))
+    friction = values["fc"] + max(values["sigma2"], 0.0) * usual
+    told = half <= SHARE * friction if e.name == "offset" else lower > 0.0 and upper <= RATIO * lower
     told &= e.lower <= value <= e.upper
     verdict = "" if told else MOVED
     return replace(e, value=value, lower=lower, upper=upper, identified=told, verdict=verdict)

@@ -26,6 +26,8 @@ NEAR, AT_ONCE, ELSEWHERE = 0.05, 3.0, 0.2
 """Of the range: values beside an extreme; steps of a rounded column, from more than which a limit is reached at once;
 share of the rows that stand still elsewhere, from which on an extreme must stand out from all of its size. Of 187 + 240
 logs those at their limit in 0.35 % of the rows are found, but two of which six rows show it, and no other."""
+LOST = 1.5
+"""Times from row to row, from which on a row is missing."""
 LEAPS = 99.0
 """Percentile of the changes of torque that a leap exceeds."""
 WORTH_A_WORD = 1e-4
@@ -196,7 +198,9 @@ def wrapped(view: View) -> Iterator[Finding]:
     turn = next((t for t in (2.0 * math.pi, 360.0, 1.0, math.pi) if abs(size / t - 1.0) < 0.05), None)
     wraps = turn is not None or size > RANGE * float(np.ptp(values))
     if not wraps:
-        at = at[~_driven(view, values, at, spiky)]
+        # While a row is missing, the axis moves on.
+        lost = np.diff(view.record.time[rows])[at] > LOST * view.period
+        at = at[~(lost | _driven(view, values, at, spiky))]
         if not at.size:
             return
     index = int(rows[at[0] + 1])

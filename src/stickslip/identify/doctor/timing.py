@@ -17,8 +17,8 @@ SHORTEST = 1e-9
 """s between two samples: no drive is faster, so that the unit must be another."""
 FEW_MS = 100.0
 """Of a unit that nobody states: samples so many apart are so many ms; farther apart, microseconds."""
-UNEVEN = 0.2
-"""A distance is uneven when it differs from the usual one by this share."""
+UNEVEN, ROUNDED = 0.2, 1e-6
+"""A distance is uneven when it differs from the usual one by more than this share, and by more than rounding."""
 JITTER = 0.02
 """Width of the middle 90 % of the distances, over their median."""
 
@@ -100,7 +100,7 @@ def sampling(view: View) -> Iterator[Finding]:
         )
     # A run may end between two samples.
     whole = steps[:-1] if steps[-1] < usual else steps
-    off = np.flatnonzero((np.abs(whole / usual - 1.0) > UNEVEN) & (whole <= GAP * usual))
+    off = np.flatnonzero((np.abs(whole / usual - 1.0) > UNEVEN + ROUNDED) & (whole <= GAP * usual))
     low, high = np.percentile(whole[whole <= GAP * usual], [5, 95])
     width = float(high - low) / usual
     if off.size:

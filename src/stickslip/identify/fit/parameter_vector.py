@@ -128,6 +128,11 @@ class Vector:
         """Names of the free parameters, in the order of `values`."""
         return tuple(p.name for p in self.free)
 
+    def signed_scale(self, friction: float) -> dict[str, float]:
+        """What the half-width of each parameter that may have either sign is compared with: angles with a radian,
+        torques with `friction`, N·m (N)."""
+        return {p.name: 1.0 if p.par.unit == "rad" else friction for p in self.free}
+
     @property
     def size(self) -> int:
         """The number of coordinates: one less than the free parameters for every group of shares."""

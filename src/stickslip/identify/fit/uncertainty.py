@@ -32,8 +32,10 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 RATIO = 2.0
 """A positive parameter is identified where upper/lower is at most this."""
+NOTHING = 1e-9
+"""Of the upper end: a lower one that is none but the least that a positive parameter can be."""
 SHARE = 0.1
-"""A signed parameter is identified where the half-width is at most this part of its scale (Fc for torques)."""
+"""A signed parameter is identified where the half-width is at most this part of its scale (friction for torques)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +246,7 @@ def verdict_on(p: Parameter, value: float, low: float, high: float, noise: Noise
     if not (low <= value <= high and math.isfinite(low) and math.isfinite(high)):
         return "the data set no limit to it"
     if p.nonnegative:
-        if low <= 0.0:
+        if low <= NOTHING * high:
             return "the data do not distinguish it from 0"
         if high > RATIO * low:
             return f"the interval spans a factor of {high / low:.3g}; identified means at most {RATIO:g}"
@@ -252,5 +254,6 @@ def verdict_on(p: Parameter, value: float, low: float, high: float, noise: Noise
     half = 0.5 * (high - low)
     if not half <= SHARE * scale:
         unit = p.par.unit
-        return f"the interval's half-width of {half:.3g} {unit} exceeds {100.0 * SHARE:g} % of {scale:.3g} {unit}"
+        what = "friction, " if unit in ("N·m", "N") else ""
+        return f"the interval's half-width of {half:.3g} {unit} exceeds {100.0 * SHARE:g} % of {what}{scale:.3g} {unit}"
     return ""

@@ -28,5 +28,9 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
 
 
 METHOD = Method(
-    "attraction", "GMS's attraction from a motion in one direction", identify, has_torque("attraction")
+    "attraction",
+    "GMS's attraction from a motion in one direction",
+    identify,
+    has_torque("attraction"),
+    values=(),
 )

@@ -18,4 +18,6 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     return identify_breakaway(records, torque=torque, **more)
 
 
-METHOD = Method("breakaway", "break-away torque from torque ramps", identify, has_torque("breakaway"))
+METHOD = Method(
+    "breakaway", "break-away torque from torque ramps", identify, has_torque("breakaway"), values=()
+)

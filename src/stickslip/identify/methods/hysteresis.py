@@ -43,5 +43,9 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
 
 
 METHOD = Method(
-    "hysteresis", "a law along the motion, from measured friction", identify, has_torque("hysteresis")
+    "hysteresis",
+    "a law along the motion, from measured friction",
+    identify,
+    has_torque("hysteresis"),
+    values=(),
 )

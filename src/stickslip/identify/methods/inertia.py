@@ -17,4 +17,4 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     return inertia(experiments, axis)
 
 
-METHOD = Method("inertia", "inertia from the frequency response", identify, driven)
+METHOD = Method("inertia", "inertia from the frequency response", identify, driven, values=())

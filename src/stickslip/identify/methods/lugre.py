@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
-from stickslip.identify.methods._records import curve_values, has_torque, single, torque_channel
+from stickslip.identify.methods._records import CURVE, curve_values, has_torque, single, torque_channel
 from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.presliding.lugre_dynamics import Response, identify_lugre_dynamics
 from stickslip.record import Record
@@ -22,4 +22,10 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     return identify_lugre_dynamics(response, options.values["inertia"], curve, noise=options.noise)
 
 
-METHOD = Method("lugre", "LuGre's stiffness and damping from stick-slip", identify, has_torque("lugre"))
+METHOD = Method(
+    "lugre",
+    "LuGre's stiffness and damping from stick-slip",
+    identify,
+    has_torque("lugre"),
+    values=(*CURVE, "inertia"),
+)

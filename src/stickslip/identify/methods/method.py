@@ -143,6 +143,9 @@ class Method:
         Whether records may judge the result instead of being fitted.
     takes_current : bool
         Whether a current without a torque constant will do.
+    values : tuple of str, or None
+        Names that a value may be set for, none of which is free or frozen; None: what is set, free and frozen are
+        parameters of a law, which it looks at itself.
     """
 
     name: str
@@ -151,6 +154,24 @@ class Method:
     check: Callable[[Sequence[Record], Options], None]
     holds_out: bool = False
     takes_current: bool = False
+    values: tuple[str, ...] | None = None
+
+    def refuse_unknown(self, options: Options) -> None:
+        """Refuse what is set, free or frozen and would go unheard.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.values is None:
+            return
+        takes = f"; it takes {', '.join(self.values)}" if self.values else ""
+        for option, names in (("set", options.values), ("free", options.free), ("freeze", options.frozen)):
+            for name in names:
+                if option != "set" or name not in self.values:
+                    raise InputError(
+                        f"--method {self.name} has no {name!r} for --{option}{takes}; leave it out"
+                    )
 
 
 def law_of(given: str | Law) -> Law:

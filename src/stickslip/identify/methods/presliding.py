@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from stickslip.identify.estimate import Identification
-from stickslip.identify.methods._records import curve_values, has_torque, single, torque_channel
+from stickslip.identify.methods._records import CURVE, curve_values, has_torque, single, torque_channel
 from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.presliding.hysteresis import Loop
 from stickslip.identify.presliding.presliding import identify_presliding
@@ -22,4 +22,10 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     )  # fmt: skip
 
 
-METHOD = Method("presliding", "GMS elements from pre-sliding loops", identify, has_torque("presliding"))
+METHOD = Method(
+    "presliding",
+    "GMS elements from pre-sliding loops",
+    identify,
+    has_torque("presliding"),
+    values=(*CURVE, "inertia"),
+)

@@ -3,11 +3,12 @@ chosen."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from stickslip.errors import InputError, UnknownName
 from stickslip.identify.estimate import Identification
 from stickslip.identify.fit.axis_start import starts
 from stickslip.identify.methods._records import has_torque, torque_channel
@@ -28,6 +29,7 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
         templates = {law.name: template(law, points.velocity, points.torque, options) for law in laws}
     else:
         templates = candidates(points.velocity, points.torque, dict(options.values))
+    refuse_unknown(options, templates.values())
     frozen = list(options.frozen)
     if len(templates) > 1:
         found = choose_sliding(
@@ -36,6 +38,23 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     else:
         found = identify_sliding(points, next(iter(templates.values())), noise=options.noise, frozen=frozen)
     return replace(found, notes=(*notes, *found.notes))
+
+
+def refuse_unknown(options: Options, templates: Iterable[Model]) -> None:
+    """Refuse names of parameters that none of the curves has, and to free what is free anyway.
+
+    Raises
+    ------
+    UnknownName, InputError
+    """
+    names = {f.name for model in templates for f in model.law.fields}
+    for name in (*options.values, *options.frozen):
+        if name.partition("[")[0] not in names:
+            raise UnknownName("parameter of --method sliding", name, names)
+    for name in options.free:
+        raise InputError(
+            f"--method sliding fits every parameter; leave --free {name} out, or --freeze the others"
+        )
 
 
 def template(law: Law, velocity: Array, torque: Array, options: Options) -> Model:

@@ -202,6 +202,12 @@ class Regression:
         return self.left_by(self.own)
 
     @property
+    def friction(self) -> float:
+        """Friction at the median speed of certain sliding, N·m (N): what a constant torque is small or large beside."""
+        slope = max(self.numbers["sigma2"].value, 0.0)
+        return abs(self.numbers["fc"].value) + slope * float(np.median(stacked(self.rows, "speed")))
+
+    @property
     def doubt(self) -> str:
         """Why its numbers are not to be believed; empty where they are."""
         inertia, level = self.numbers["inertia"], abs(self.numbers["fc"].value)

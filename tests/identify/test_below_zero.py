@@ -1,0 +1,31 @@
+"""An interval that lies below 0 says that the model is wrong, not that a number is the least that it can be."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from stickslip.identify.axis.falling import told
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.fit.parameter_vector import Parameter
+from stickslip.spec import Par
+
+START = Estimate("inertia", "kg·m²", "J", 1.0, math.inf, -math.inf, math.inf, False)
+
+
+def parameter(*, positive: bool) -> Parameter:
+    return Parameter("inertia", Par("kg·m²", "J", "inertia", lower=0.0, positive=positive), 1.0)
+
+
+@pytest.mark.parametrize("positive", [True, False])
+def test_an_interval_below_zero_identifies_nothing(positive: bool) -> None:
+    said = told(START, parameter(positive=positive), -0.0125, -0.0214, -0.0036, math.nan)
+    assert not said.identified
+    assert "asks for -0.0125 kg·m² (-0.0036 at most), and it cannot be below 0" in said.verdict
+    assert 0.0 <= said.lower <= said.value < said.upper == pytest.approx(0.0214)
+
+
+def test_one_that_reaches_zero_is_not_told_from_it() -> None:
+    said = told(START, parameter(positive=True), 0.1, -0.1, 0.3, math.nan)
+    assert (said.identified, said.verdict) == (False, "the data do not distinguish it from 0")

@@ -1,0 +1,37 @@
+"""Names of parameters that a method has no use for are refused, not passed over."""
+
+from __future__ import annotations
+
+import pytest
+
+from stickslip.errors import InputError, UnknownName
+from stickslip.identify.methods import METHODS, method_named
+from stickslip.identify.methods.method import Options
+from stickslip.identify.methods.sliding import refuse_unknown
+from stickslip.model import Model
+
+OWN = ("axis", "cogging", "sliding")
+"""Those that look at parameters of a law, or at names of their own, themselves."""
+
+
+@pytest.mark.parametrize("name", [n for n in METHODS if n not in OWN])
+def test_a_method_refuses_what_it_would_not_hear(name: str) -> None:
+    method = method_named(name)
+    for given, option in (
+        (Options(values={"rubbish": 3.0}), "set"), (Options(free=("fc",)), "free"), (Options(frozen=("fc",)), "freeze")
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=f"--method {name} has no '(rubbish|fc)' for --{option}"):
+            method.refuse_unknown(given)
+    method.refuse_unknown(Options(values=dict.fromkeys(method.values or (), 1.0)))
+
+
+def test_sliding_knows_the_parameters_of_its_curves() -> None:
+    curves = [
+        Model("coulomb", fc=1.0, sigma2=0.1),
+        Model("stribeck_plain", fs=1.2, fc=1.0, vs=0.1, sigma2=0.1),
+    ]
+    refuse_unknown(Options(values={"vs": 0.1}, frozen=("fc",)), curves)
+    with pytest.raises(UnknownName, match="'rubbish'"):
+        refuse_unknown(Options(values={"rubbish": 3.0}), curves)
+    with pytest.raises(InputError, match="leave --free fc out"):
+        refuse_unknown(Options(free=("fc",)), curves)
