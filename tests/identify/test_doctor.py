@@ -240,7 +240,7 @@ def test_errors_stop_with_exit_code_2(tmp_path, capsys, monkeypatch):
         (["--map", "position=position [rad]:Nm"], "unit of torque"),
         (["--gear-ratio", "0"], "--gear-ratio 0"),
         (["--profile", str(tmp_path)], "cannot be read"),
-        (["--sample-time", "-1"], "sample_time = -1"),
+        (["--sample-time", "-1"], "--sample-time -1"),
         (["--stribeck-velocity", "0"], "greater than 0"),
     ):
         assert main(["doctor", str(log), *argv]) == 2

@@ -160,7 +160,8 @@ def identify_axis(
             named = {*free, *frozen, *given.values}
             if automatic and not per_direction and nothing_more(found, named):
                 return simplest_of(found, given, evidence, notes, SIMPLEST)
-            if automatic and not per_direction and leaves_more(found, named):
+            falls = evidence.sliding is not None and evidence.sliding.shows_a_fall
+            if automatic and not (per_direction or falls) and leaves_more(found, named):
                 simpler = simplest_of(found, given, evidence, notes, CLOSER)
                 return simpler if ALIKE * of_torque(simpler) < of_torque(found) else found
             return found
