@@ -264,7 +264,10 @@ def settled(
             )
             chosen, error, asked = moved, less, set(held)
     notes += made_by_a_controller(inverse, error)
-    out = (placed(e, chosen, inverse, e.name in asked) for e in estimates)
+    friction = chosen["fc"]
+    if not by_name["fc"].identified:
+        friction += chosen["sigma2"] * float(np.median(np.abs(inverse.velocity)))
+    out = (placed(e, chosen, inverse, friction, e.name in asked) for e in estimates)
     if refuted_by is None:
         return tuple(out), notes
     return tuple(told_alone(e, values["fc"]) if e.name == "fc" else e for e in out), notes
@@ -348,7 +351,9 @@ def turned(
     return dict.fromkeys(GRAVITY, (-math.inf, math.inf))
 
 
-def placed(e: Estimate, values: Mapping[str, float], inverse: InverseDynamics, asked: bool) -> Estimate:
+def placed(
+    e: Estimate, values: Mapping[str, float], inverse: InverseDynamics, friction: float, asked: bool
+) -> Estimate:
     """The estimate with its value chosen; its interval holds it, and reaches as far beyond one that the whole record
     `asked` for."""
     value = values[e.name]
@@ -361,8 +366,6 @@ def placed(e: Estimate, values: Mapping[str, float], inverse: InverseDynamics, a
     lower, upper = min(e.lower, value - half), max(e.upper, value + half)
     if e.name != "offset":
         lower = max(lower, 0.0)
-    usual = float(np.median(np.abs(inverse.velocity[inverse.velocity != 0.0])))
-    friction = values["fc"] + max(values["sigma2"], 0.0) * usual
     told = half <= SHARE * friction if e.name == "offset" else lower > 0.0 and upper <= RATIO * lower
     told &= e.lower <= value <= e.upper
     verdict = "" if told else MOVED

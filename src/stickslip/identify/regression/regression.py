@@ -203,9 +203,12 @@ class Regression:
 
     @property
     def friction(self) -> float:
-        """Friction at the median speed of certain sliding, N·m (N): what a constant torque is small or large beside."""
-        slope = max(self.numbers["sigma2"].value, 0.0)
-        return abs(self.numbers["fc"].value) + slope * float(np.median(stacked(self.rows, "speed")))
+        """What a constant torque is small or large beside, N·m (N): Fc; friction at the median speed of certain sliding
+        where Fc is not told to a factor of two."""
+        level, slope = abs(self.numbers["fc"].value), max(self.numbers["sigma2"].value, 0.0)
+        if told_to_two(self.numbers["fc"]):
+            return level
+        return level + slope * float(np.median(stacked(self.rows, "speed")))
 
     @property
     def doubt(self) -> str:
