@@ -50,7 +50,7 @@ LONGER = 2.0  # times the memory: length of a piece that counts as one observati
 HUNDREDTH = 2.326  # standard deviations that a normal number exceeds in one of a hundred cases
 FEW = 4  # degrees of freedom, below which a variance refutes nothing
 SYSTEMATIC = 0.02  # of the misfit: what may not average out
-STIFF, LATE = 0.08, 0.2  # the same for inertia and skew, of an axis that is not stiff
+STIFF, LATE = 0.12, 0.2  # the same for inertia and skew, of an axis that is not stiff
 DAMPED_AWAY = 1e-100  # norm of a column
 LEAST = 1e-14  # of the largest eigenvalue of products: below it there is rounding alone
 
