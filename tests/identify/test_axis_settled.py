@@ -11,7 +11,7 @@ import pytest
 from stickslip.binding import NEGATIVE
 from stickslip.identify.axis.agreed import held_against
 from stickslip.identify.axis.choice import Candidate, chosen_of, sentence_on
-from stickslip.identify.axis.identify import nothing_more
+from stickslip.identify.axis.identify import leaves_more, nothing_more
 from stickslip.identify.axis.settled import settled
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
@@ -299,3 +299,27 @@ def test_without_certain_sliding_no_level_is_identified_and_nothing_that_plain_l
     found = held_against(wrong, inverse)
     assert not any(e.identified for e in found)
     assert all("too little in one direction to decide" in e.verdict for e in found)
+
+
+@pytest.mark.parametrize(
+    ("own", "identified", "given", "gives_way"),
+    [
+        (
+            0.087,
+            ("k",),
+            (),
+            True,
+        ),  # joint 6 of another arm: friction at rest above the largest torque recorded
+        (0.061, ("k",), (), False),  # as good as plain least squares
+        (0.087, ("k", "fs", "vs", "delta_s"), (), False),
+        (0.087, ("k",), ("fs",), False),
+    ],
+)
+def test_a_law_that_leaves_more_than_plain_least_squares_gives_way_where_it_is_not_told(
+    own: float, identified: tuple[str, ...], given: tuple[str, ...], gives_way: bool
+) -> None:
+    law = Model("stribeck", k=50.0, fs=0.4, fc=0.3, vs=0.1, delta_s=2.0, sigma2=0.02)
+    misfit = {"force_relative": own, "inverse_dynamics_relative": 0.06}
+    found = replace(told(law, **{n: n in identified for n in ("k", "fs", "vs", "delta_s")}), misfit=misfit)
+    assert leaves_more(found, {*given}) == gives_way
+    assert not leaves_more(replace(told(COULOMB), misfit=misfit), set())

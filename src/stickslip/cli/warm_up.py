@@ -23,15 +23,15 @@ STEPS: dict[str, Sequence[str]] = {
     "a drive's controller": ("simulate", "drive.toml"),
     "pictures": ("law", "lugre", "--plot"),
     "identification and recommendation": ("demo",),
-    "friction by direction": (
+    "friction by direction": [
         "identify",
         "stickslip-demo/demo.csv",
         "--per-direction",
         "--no-report",
         "--out",
-        "each-way.toml",
-    ),
-    "a cascade": (
+        "two.toml",
+    ],
+    "a cascade": [
         "recommend",
         "stickslip-demo/model.toml",
         "--loop",
@@ -40,9 +40,7 @@ STEPS: dict[str, Sequence[str]] = {
         "2",
         "--confirm",
         "3",
-        "--out",
-        "cascade.toml",
-    ),
+    ],
     "rigs": ("rig", "run", "breakaway", "--rig", "thesis-dry"),
     "sweeps": ("sweep", "thesis-robustness", "--cases", "1", "--jobs", "1", "--no-report"),
 }

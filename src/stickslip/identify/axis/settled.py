@@ -258,10 +258,8 @@ def settled(
             (moved, less), where = followed or (chosen, error), "within"
             notes = [] if followed else [KEPT]
         if less < error:
-            clearly = less < WORTH_A_WORD * error
-            notes = (
-                [BEST_WITHIN.format(where=where, less=100.0 * less, before=100.0 * error)] if clearly else []
-            )
+            said = BEST_WITHIN.format(where=where, less=100.0 * less, before=100.0 * error)
+            notes = [said] if less < WORTH_A_WORD * error else []
             chosen, error, asked = moved, less, set(held)
     notes += made_by_a_controller(inverse, error)
     friction = chosen["fc"]
