@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
+from stickslip import law
 from stickslip.identify.axis.falling import told
+from stickslip.identify.axis.result import advice
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.parameter_vector import Parameter
+from stickslip.identify.regression.regression import APART
 from stickslip.spec import Par
 
 START = Estimate("inertia", "kg·m²", "J", 1.0, math.inf, -math.inf, math.inf, False)
@@ -22,10 +26,20 @@ def parameter(*, positive: bool) -> Parameter:
 def test_an_interval_below_zero_identifies_nothing(positive: bool) -> None:
     said = told(START, parameter(positive=positive), -0.0125, -0.0214, -0.0036, math.nan)
     assert not said.identified
-    assert "asks for -0.0125 kg·m² (-0.0036 at most), and it cannot be below 0" in said.verdict
+    assert "asks for -0.0125 kg·m² (-0.0036 at most), which cannot be below 0" in said.verdict
     assert 0.0 <= said.lower <= said.value < said.upper == pytest.approx(0.0214)
 
 
 def test_one_that_reaches_zero_is_not_told_from_it() -> None:
     said = told(START, parameter(positive=True), 0.1, -0.1, 0.3, math.nan)
     assert (said.identified, said.verdict) == (False, "the data do not distinguish it from 0")
+
+
+def test_what_to_measure_next_does_not_contradict_the_verdict() -> None:
+    coulomb = law("coulomb")
+    below = told(START, parameter(positive=True), -0.0125, -0.0214, -0.0036, math.nan)
+    assert advice([below], coulomb) == ("Log torque and motion by one clock, without filters of their own.",)
+    apart = replace(START, verdict=APART.format(share=6.0))
+    assert advice([apart], coulomb) == ("Record gentler accelerations: motor and load then move as one.",)
+    wide = replace(START, verdict="the interval spans a factor of 4; identified means at most 2")
+    assert advice([wide], coulomb) == ("Record stronger accelerations.",)

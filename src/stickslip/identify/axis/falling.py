@@ -26,10 +26,10 @@ NARROW, FORM = 1.6, 0.02
 """Factor on certain sliding's standard deviation of these, and the part of the value that its form is true to."""
 LEAST = 1e-12
 """Of an interval's end: what stands for 0 where a parameter must be greater."""
-BELOW = (
-    "the torque asks for {value:.3g} {unit} ({high:.3g} at most), and it cannot be below 0: the columns do not belong "
-    "together (a torque or velocity that comes late), or something else moves the axis"
+NOT_TOGETHER = (
+    "the columns do not belong together (a torque or velocity that comes late), or something else moves it"
 )
+BELOW = f"the torque asks for {{value:.3g}} {{unit}} ({{high:.3g}} at most), which cannot be below 0: {NOT_TOGETHER}"
 AT_REST = "extrapolated to rest: at which velocity friction falls to its level is not told"
 
 

@@ -14,7 +14,7 @@ from stickslip.identify.axis.agreed import TOLD_BY_SLIDING
 from stickslip.identify.axis.choice import (
     Candidate,
 )  # fmt: skip
-from stickslip.identify.axis.falling import number_of, with_rest
+from stickslip.identify.axis.falling import NOT_TOGETHER, number_of, with_rest
 from stickslip.identify.axis.gravity import within_a_turn
 from stickslip.identify.axis.load_check import ADVICE, judged_load
 from stickslip.identify.axis.loop_check import doubted_loops
@@ -29,7 +29,7 @@ from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.identify.regression.bands import GAUSSIAN
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.regression.regression import Regression
+from stickslip.identify.regression.regression import NOT_AS_ONE, Regression
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
@@ -252,6 +252,10 @@ def advice(estimates: Sequence[Estimate], law: Law) -> tuple[str, ...]:
         )
     if "load_motor" in missing:
         out.append(ADVICE)
+    elif any(NOT_TOGETHER in e.verdict for e in estimates):
+        out.append("Log torque and motion by one clock, without filters of their own.")
+    elif any(NOT_AS_ONE in e.verdict for e in estimates):
+        out.append("Record gentler accelerations: motor and load then move as one.")
     elif "inertia" in missing:
         out.append("Record stronger accelerations.")
     if "fc" in missing:

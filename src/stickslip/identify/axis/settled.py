@@ -68,7 +68,8 @@ BEST_WITHIN = (
 )
 CONTROLLER = (
     "Plain least squares leaves less of the torque, {plain:.3g} % against {own:.3g} %, with {names} below 0, which "
-    "no friction is: such a torque is made from the velocity by a controller. Record moves under position control."
+    "no friction is: such a torque is made from the velocity by a controller, or comes late. Record moves under "
+    "position control, all columns by one clock."
 )
 SURE = 3.0
 """Standard deviations below 0 from which on a friction of plain least squares is one that cannot be."""
