@@ -87,7 +87,7 @@ def assembled(
         correlation,
         misfit,
         tuple(notes),
-        measure_next=advice(judged, result.problem.law),
+        measure_next=advice(judged, result.problem.law, sliding.doubt if sliding else ""),
         details={
             "mechanics": result.mechanics, "inverse": inverse, "regression": sliding,
             "output": result, "candidates": tuple(candidates),
@@ -232,8 +232,8 @@ def narrow_note(result: OutputError, ask: bool = True) -> str:
     return said + "."
 
 
-def advice(estimates: Sequence[Estimate], law: Law) -> tuple[str, ...]:
-    """What to measure to settle what is not identified."""
+def advice(estimates: Sequence[Estimate], law: Law, doubt: str = "") -> tuple[str, ...]:
+    """What to measure to settle what is not identified; `doubt` is why certain sliding is not to be believed."""
     missing = {e.name.partition("[")[0] for e in estimates if not e.identified}
     out: list[str] = []
     units = {f.name: f.par.unit for f in law.fields}
@@ -254,7 +254,7 @@ def advice(estimates: Sequence[Estimate], law: Law) -> tuple[str, ...]:
         out.append(ADVICE)
     elif any(NOT_TOGETHER in e.verdict for e in estimates):
         out.append("Log torque and motion by one clock, without filters of their own.")
-    elif any(NOT_AS_ONE in e.verdict for e in estimates):
+    elif NOT_AS_ONE in doubt:
         out.append("Record gentler accelerations: motor and load then move as one.")
     elif "inertia" in missing:
         out.append("Record stronger accelerations.")
