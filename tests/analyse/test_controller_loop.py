@@ -194,7 +194,7 @@ def test_the_command(tmp_path, monkeypatch, capsys):
     for wrong, words in (
         (["--bandwidth", "20"], "--bandwidth cannot be combined with --controller c.toml, which defines it"),
         (["--confirm", "--delay", "0.5"], "--confirm runs the machine with its own delay"),
-        (["--delay", "-1"], "delay = -1 samples must be from 0 to 100"),
+        (["--delay", "-1"], "--delay -1 samples must be from 0 to 100"),
     ):
         assert main([*line, *wrong]) == 2
         assert words in capsys.readouterr().err

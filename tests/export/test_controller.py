@@ -268,7 +268,7 @@ def test_the_command_line_divides_and_states_the_error(tmp_path, monkeypatch, ca
     assert f"| 1 | {step_errors(lugre)[1].whole:.2g} | {step_errors(lugre, parts=8)[1].parts:.2g} |" in readme
     assert "in 8 substeps" in readme
     assert "`p.feedforward_substeps` = 8" in readme
-    for more, said in ((["8"], "--substeps belongs to"), (["0", "--compensator", "fb"], "substeps = 0 must")):
+    for more, said in ((["8"], "--substeps belongs to"), (["0", "--compensator", "fb"], "--substeps 0 must")):
         assert main([*call, *more]) == 2
         assert said in capsys.readouterr().err
 

@@ -83,7 +83,7 @@ def test_a_run_in_which_nothing_can_move_is_refused(duration):
 @pytest.mark.parametrize("call", [["sweep", "thesis-robustness"], ["study", "thesis"]])
 def test_numbers_of_workers(call, jobs, tmp_path, capsys):
     assert cli.main([*call, f"--jobs={jobs}", "--out", str(tmp_path / "out")]) == 2
-    assert f"jobs = {jobs} must be 1 to {32 * (os.cpu_count() or 1)}" in capsys.readouterr().err
+    assert f"--jobs {jobs} must be 1 to {32 * (os.cpu_count() or 1)}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("cases", ["1" + 20 * "0", "0", "-1"])
