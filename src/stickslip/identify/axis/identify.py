@@ -158,13 +158,8 @@ def identify_axis(
         try:
             found = estimated(chosen, own, evidence, notes)
             named = {*free, *frozen, *given.values}
-            if automatic and not per_direction and nothing_more(found, named):
-                return simplest_of(found, given, evidence, notes, SIMPLEST)
-            falls = evidence.sliding is not None and evidence.sliding.shows_a_fall
-            if automatic and not (per_direction or falls) and leaves_more(found, named):
-                simpler = simplest_of(found, given, evidence, notes, CLOSER)
-                return simpler if ALIKE * of_torque(simpler) < of_torque(found) else found
-            return found
+            changes = automatic and not per_direction
+            return rather_simplest(found, given, named, evidence, notes) if changes else found
         except InputError as error:
             lacking = f"{NO_PREDICTION} {error}."
     return by_output_error(chosen, own, evidence, notes, profiles=profiles, lacking=lacking)
@@ -202,6 +197,19 @@ def refuse_a_weight(sliding: Regression | None, axis: ServoAxis) -> None:
                 f"a constant torque of {constant:.3g} {axis.unit('N·m')} is larger than friction, {level:.3g}, so that "
                 "it is no difference of its directions but a weight, a spring or an offset; leave out --per-direction"
             )
+
+
+def rather_simplest(
+    found: Identification, asked: Asked, named: Set[str], evidence: Evidence, notes: Sequence[str]
+) -> Identification:
+    """What was found; the simplest law where the record tells nothing more, or that explains the torque better."""
+    if nothing_more(found, named):
+        return simplest_of(found, asked, evidence, notes, SIMPLEST)
+    falls = evidence.sliding is not None and evidence.sliding.shows_a_fall
+    if falls or not leaves_more(found, named):
+        return found
+    simpler = simplest_of(found, asked, evidence, notes, CLOSER)
+    return simpler if ALIKE * of_torque(simpler) < of_torque(found) else found
 
 
 def simplest_of(

@@ -16,7 +16,6 @@ import numpy as np
 
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import Array, Smooth, View
-from stickslip.identify.regression.regression import told_to_two
 
 ROWS = 20_000
 """Rows of a regression: more tell no more."""
@@ -129,7 +128,7 @@ def skew(view: View) -> Iterator[Finding]:
     # Only what accelerates the axis tells a time; ringing and torque over the position pass for a skew of many rows,
     # and for an inertia that is known badly.
     shows = found.shows_inertia and max(b.relative for b in found.bands) <= UNEXPLAINED
-    sure = shows and told_to_two(found.numbers["inertia"]) and found.confirmed("skew")
+    sure = shows and found.numbers["inertia"].told_to_two and found.confirmed("skew")
     untold = not sure or half > MANY * row
     if untold and (at_reversals := _skew_at_reversals(smooth)) is not None:
         late, half, sure = at_reversals, smooth.period, True

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.band_system import (
     COULOMB,
     INERTIA,
@@ -58,6 +59,12 @@ class Number:
     def interval(self) -> tuple[float, float]:
         """Of 95 %."""
         return self.value - QUANTILE * self.std, self.value + QUANTILE * self.std
+
+    @property
+    def told_to_two(self) -> bool:
+        """Whether its interval spans a factor of two at most."""
+        low, high = self.interval
+        return 0.0 < high <= RATIO * low
 
 
 @dataclass(frozen=True, eq=False)

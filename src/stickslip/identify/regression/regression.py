@@ -21,7 +21,6 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.experiment import Experiment
-from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.band_fit import QUANTILE, BandFit, Number
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS, least_squares
 from stickslip.identify.regression.bands import (
@@ -204,9 +203,8 @@ class Regression:
         """What a constant torque is small or large beside, N·m (N): Fc; friction at the median speed of certain sliding
         where Fc is not told to a factor of two."""
         level, slope = abs(self.numbers["fc"].value), max(self.numbers["sigma2"].value, 0.0)
-        if told_to_two(self.numbers["fc"]):
-            return level
-        return level + slope * float(np.median(stacked(self.rows, "speed")))
+        usual = float(np.median(stacked(self.rows, "speed")))
+        return level if self.numbers["fc"].told_to_two else level + slope * usual
 
     @property
     def doubt(self) -> str:
@@ -269,7 +267,7 @@ class Regression:
     @property
     def slope_told(self) -> bool:
         """Whether viscous friction is told to a factor of two."""
-        return told_to_two(self.numbers["sigma2"])
+        return self.numbers["sigma2"].told_to_two
 
     @property
     def fall_may_hide(self) -> bool:
@@ -357,19 +355,13 @@ def regress_axis(
 
 def as_told(numbers: Mapping[str, Number], size: float, period: float) -> Number:
     """The skew, s: no surer than its usual size where the inertia, by which acceleration shows it, is not told."""
-    found, untold = numbers["skew"], not told_to_two(numbers["inertia"])
+    found, untold = numbers["skew"], not numbers["inertia"].told_to_two
     return Number(found.value, math.hypot(found.std, FINEST * period, size if untold else 0.0))
-
-
-def told_to_two(number: Number) -> bool:
-    """Whether its interval spans a factor of two at most."""
-    low, high = number.interval
-    return 0.0 < high <= RATIO * low
 
 
 def with_form(level: Number, slope: Number) -> Number:
     """The level of friction, where the slope beside it is not told no surer than a law's form is true."""
-    if told_to_two(slope):
+    if slope.told_to_two:
         return level
     return Number(level.value, math.hypot(level.std, FORM * level.value))
 
