@@ -1,11 +1,12 @@
-"""What a sample costs: the sampled engine's located flow and its general step, in one run, with the error of each.
+"""What a sample costs: the located flows of axes and trains and the general step, in one run, with the error of each.
 
     python benchmarks/sampled_engine.py [--prototypes DIR]
 
-The thesis's axis under a PD of 20 Hz at 1 kHz with LuGre feedforward and a torque limit, at low and at high velocity.
-The error is the largest distance in position from the located flow at a tolerance of 1e-12 rad, which
-`tests/simulation/test_sampled.py` holds against independent results, and for laws that have none from general steps at
-1e-11 rad. Times are CPU times, the least of several runs, without metrics, a row at every sample.
+The thesis's axis under a PD of 20 Hz at 1 kHz with LuGre feedforward and a torque limit, at low and at high velocity;
+behind the axes three inertias as a machine. The error is the largest distance in position from the located flow at a
+tolerance of 1e-12 rad, which `tests/simulation/test_sampled.py` and `test_train.py` hold against independent results,
+and for laws that have none from general steps at 1e-11 rad. Times are CPU times, the least of several runs, without
+metrics, a row at every sample.
 """
 
 from __future__ import annotations
@@ -22,7 +23,12 @@ from unittest.mock import patch
 import numpy as np
 
 import stickslip as ss
+from stickslip.machines.contact import Contact
+from stickslip.machines.flexible import FlexibleAxis
+from stickslip.machines.machine import Machine
 from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.machine import loop as machine_loop
+from stickslip.simulation.machine.layout import lay_out_machine
 from stickslip.simulation.sampled import engine as sampled
 
 INERTIA, TIME = 3.8623e-4, 1e-3
@@ -44,6 +50,11 @@ OTHERS = tuple(
     for name in ("static", "stribeck_plain", "karnopp", "dahl", "elasto_plastic")
 )
 """Laws without a located flow."""
+ROTOR, SHAFT, DISK = 1.2e-4, 1.2e-4, 1.8757e-4
+TRAIN = Machine(
+    "three inertias", ROTOR + SHAFT + DISK, Contact(LAWS[0]), sample_time=TIME,
+    flexible=FlexibleAxis(ROTOR, SHAFT, DISK, 17800.0, 396.0, 0.03),
+)  # fmt: skip
 FLOWS, STEPS = (1e-8, 1e-9), (1e-6, 1e-8)
 """Tolerances of located flows and of general steps, rad."""
 
@@ -81,6 +92,23 @@ def ways(law, reference, duration, controller):
     return positions(sampled.run(case(1e-12))), flows | runs
 
 
+def train_ways(reference, duration):
+    """The same of the three inertias."""
+    controller = ss.Controller(ss.place("PD", TRAIN.inertia, 20.0, 1.0), ss.Feedforward(LUGRE), 1.0, TIME)
+
+    def flow(tolerance):
+        return machine_loop.simulate_machine(
+            TRAIN, controller, reference, duration, metered=False, tolerance=tolerance
+        )
+
+    def by_steps(tolerance):
+        with patch.object(machine_loop, "lay_out_machine", partial(lay_out_machine, located=False)):
+            return flow(tolerance)
+
+    runs = {f"flow {t:g}": (partial(flow, t), 12) for t in FLOWS}
+    return flow(1e-12)["position"], runs | {f"sub-steps {t:g}": (partial(by_steps, t), 5) for t in STEPS}
+
+
 def prototypes(folder):
     """Print what a sample costs in C: the prototypes in a folder, compiled here, at tolerances of their own."""
     with tempfile.TemporaryDirectory() as own:
@@ -93,12 +121,15 @@ def prototypes(folder):
 
         gms = build("a13.c", "gms.so", "-DPLANT=1", "-DNT=8")
         lugre = build("a2.c", "lugre.so", "-DNT=10")
+        train = build("a13.c", "train.so", "-DPLANT=3", "-DNT=12")
         for motion, (_, _, samples) in REFS.items():
             p = params(1, motion, 0)
             loops = {
                 "gms": partial(runA, gms, p, samples, 1e-9, tables(1, p)),
                 "lugre": partial(runA, lugre, params(2, motion, 0), samples, 1e-12, np.zeros(1)),
             }
+            p = params(3, motion, 0)
+            loops["three inertias"] = partial(runA, train, p, samples, 1e-10, tables(3, p))
             for law, loop in loops.items():
                 _, least = timed(loop, 20)
                 print(f"{law:<16}{motion:<8}{'C text':<14}{1e6 * least / samples:>10.2f}", flush=True)
@@ -125,6 +156,16 @@ def main() -> None:
                     f"{law.law.name:<16}{motion:<8}{name:<14}{each:>10.2f}{error:>12.1e}{outcome.counts['events']:>8}",
                     flush=True,
                 )
+    for motion, (reference, duration) in MOTIONS.items():
+        truth, runs = train_ways(reference, duration)
+        for name, (run, repeats) in runs.items():
+            run()
+            record, least = timed(run, repeats)
+            error = float(np.abs(record["position"] - truth).max())
+            print(
+                f"{TRAIN.name:<16}{motion:<8}{name:<14}{1e6 * least * TIME / duration:>10.2f}{error:>12.1e}",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -15,12 +15,14 @@ from stickslip.machines.files import machine
 
 def test_friction_drops_when_its_drift_begins():
     ideal = machine("ideal")
-    drop = replace(ideal, contact=replace(ideal.contact, drift=Drift(-0.3, 1e-3, 0.4)))
+    later, drop = (
+        replace(ideal, contact=replace(ideal.contact, drift=Drift(-0.3, 1e-3, begin))) for begin in (0.9, 0.4)
+    )
     loop = ss.ControlBlock("pd", kp=20.0, kd=0.2)
     control = ss.Controller(loop=loop, sample_time=1e-3, torque_limit=1.0)
     runs = [
         ss.simulate(one, control, ss.Reference("ramp", velocity=2.0), 0.8, metered=False)
-        for one in (ideal, drop)
+        for one in (later, drop)
     ]
     torque = [r.channels["friction_torque"] for r in runs]
     before, after = runs[0].time < 0.4, runs[0].time > 0.5

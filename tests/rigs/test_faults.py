@@ -210,6 +210,8 @@ def test_a_compensator_in_python_that_fails(seed, tmp_path):
     ended(rig, path, at)
 
 
+# Room is reserved beside the loop, which in blocks outruns real time: on a busy machine it may come too late.
+@pytest.mark.flaky(reruns=2)
 @pytest.mark.parametrize("blocks", [True, False])
 @pytest.mark.parametrize("extents", [2, 3, 4, 5, 6])
 def test_the_disk_is_full(extents, blocks, tmp_path):

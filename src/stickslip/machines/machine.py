@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, cast
 
 from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
@@ -131,7 +132,7 @@ class Machine:
         """The whole friction of the axis as its motor sees it."""
         return self.contact.friction
 
-    @property
+    @cached_property
     def clutch(self) -> Model:
         """The law at the friction disk, with the springs it has there."""
         return self.contact.clutch(self.spring_factor)

@@ -106,7 +106,7 @@ def laid_out(plant: RigidAxis, sample_time: float, counts: float) -> Laid:
 
 def laid_anew(own: Plant, sample_time: float, counts: float) -> Laid:
     """The same, for a plant that was not yet laid out for such a drive."""
-    laid = lay_out_machine(own.built(sample_time, counts))
+    laid = lay_out_machine(own.built(sample_time, counts), located=False)
     laid.surroundings[1], laid.surroundings[2] = own.load, own.temperature
     n = laid.machine
     beside = [(0.0, -own.offset, 0.0), *own.waves]

@@ -72,6 +72,8 @@ class Output(NamedTuple):
         The meter's (`stickslip.simulation._meter`).
     counts : array of int, shape (2,)
         Samples run, rows written.
+    metered : bool
+        Whether the meter is handed the samples.
     """
 
     places: Any
@@ -80,6 +82,7 @@ class Output(NamedTuple):
     turns: Any
     nodes: Any
     counts: Any
+    metered: bool
 
 
 class Asked(NamedTuple):
@@ -142,7 +145,8 @@ def drive(loop: Loop, samples: int, output: Output) -> int:
         sample(plant, torque, shown)
         now(plant, shown, end)
         end.compensating = begin.compensating
-        gather(asked, metered, k * period, period, begin, end)
+        if output.metered:
+            gather(asked, metered, k * period, period, begin, end)
         for i in range(ENDS):
             ends[i] = ends[ENDS + i]
         counts[0] = k + 1

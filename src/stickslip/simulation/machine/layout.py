@@ -32,6 +32,7 @@ from stickslip.simulation.machine.plant import (
 from stickslip.simulation.machine.step import measure, sample
 from stickslip.simulation.root import ROOT
 from stickslip.simulation.root import compiled as root
+from stickslip.simulation.train.layout import NO_TRAIN, halvings, lay_out_train, stand_train
 from stickslip.spec import Surroundings
 
 __all__ = ["CHANNELS", "Laid", "lay_out_machine", "look", "run", "stand_at", "wait"]
@@ -50,7 +51,7 @@ TOLERANCE = 1e-7
 """rad, in position, which one sub-step may be wrong by at the end of the sample."""
 
 
-def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE) -> Laid:
+def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE, *, located: bool = True) -> Laid:
     """Arrays of a machine at rest at position 0.
 
     Parameters
@@ -58,6 +59,9 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE) -> Laid:
     machine : Machine
     tolerance : float
         Error in position that a sub-step may make by the end of its sample, rad.
+    located : bool
+        Whether it may move along the located flow of its train; False: by sub-steps, which know of torques over the
+        position that are written into it later.
     """
     model = machine.clutch
     pointers = compiled_law(model.law)
@@ -66,11 +70,16 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE) -> Laid:
     stiff = contact_spring(machine)
     resolving = halvings(machine.sample_time * math.sqrt(stiff / disk_of(machine)) / RESOLVED)
     unresolved = resolving > UNRESOLVABLE
-    places, matrix = transition(machine, 0.0 if unresolved else stiff)
+    parameters = flat(model.law.pack(model.parameters))
+    train = lay_out_train(machine, parameters, tolerance) if located else NO_TRAIN.copy()
+    system = machine.linear().state_space()
+    places = places_in(system, machine)
+    matrix = transition(machine, system, 0.0 if unresolved else stiff) if train.size == 1 else np.zeros(1)
     numbers, memory = np.zeros(1, MACHINE), np.zeros(1, NOW)
     n, now = numbers[0], memory[0]
     write_numbers(n, machine, places, tolerance)
     n["states"], n["stiffness"], n["unresolved"] = states, stiff, unresolved
+    n["located"] = train.size > 1
     n["resolving"] = min(resolving, UNRESOLVABLE)
     if unresolved:
         n["coarsest"] = UNRESOLVABLE
@@ -81,19 +90,13 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE) -> Laid:
     contact[:states] = state[:states]
     return Laid(
         numbers.view(np.float64), memory.view(np.float64), waves_of(machine), matrix, search,
-        np.zeros(2 * SLOTS), contact, flat(model.law.pack(model.parameters)), np.array(Surroundings()),
-        pointers.step, pointers.holding,
+        np.zeros(2 * SLOTS), contact, parameters, np.array(Surroundings()), train, pointers.step, pointers.holding,
     )  # fmt: skip
 
 
 def disk_of(machine: Machine) -> float:
     """The inertia at the contact, kg·m²."""
     return machine.flexible.disk if machine.flexible else machine.inertia
-
-
-def halvings(parts: float) -> int:
-    """Halvings of a sample that make at least so many parts."""
-    return max(math.ceil(math.log2(parts)), 0) if parts > 1.0 else 0
 
 
 def contact_spring(machine: Machine) -> float:
@@ -108,24 +111,28 @@ def contact_spring(machine: Machine) -> float:
     return abs(torque) / tiny
 
 
-def transition(machine: Machine, stiff: float) -> tuple[dict[str, int], Array]:
-    """Where the states lie, and the exact flow of the linear part over every length of a sub-step, with every part of
-    the contact's stiffness (N·m/rad): what it makes of the states, and what each input adds."""
-    system = machine.linear().state_space()
-    places = {
+def places_in(system: StateSpace, machine: Machine) -> dict[str, int]:
+    """Where the states lie, and how many they are."""
+    return {
         "rotor": 0, "shaft": 2 if machine.flexible else 0, "disk": 4 if machine.flexible else 0,
         "lag": place_of("torque", system), "mode": place_of("mode", system), "size": len(system.states),
     }  # fmt: skip
+
+
+def transition(machine: Machine, system: StateSpace, stiff: float) -> Array:
+    """The exact flow of the linear part over every length of a sub-step, with every part of the contact's stiffness
+    (N·m/rad): what it makes of the states, and what each input adds."""
+    disk = 4 if machine.flexible else 0
     out = np.zeros((SPRINGS + 1 if stiff > 0.0 else 1, LEVELS, COLUMNS, SLOTS))
     for part in range(out.shape[0]):
         spring = stiff * part / SPRINGS
         a = system.a.copy()
-        a[:, places["disk"]] -= spring * system.b[:, INPUTS.index("load")]
+        a[:, disk] -= spring * system.b[:, INPUTS.index("load")]
         flow = replace(system, a=a).over(math.ldexp(machine.sample_time, 1 - LEVELS))
         for level in reversed(range(LEVELS)):
             columns(out[part, level], flow, spring)
             flow = flow.doubled()
-    return places, flat(out.ravel())
+    return flat(out.ravel())
 
 
 def columns(out: Array, flow: Flow, spring: float) -> None:
@@ -217,3 +224,4 @@ def stand_at(laid: Laid, position: float, velocity: float = 0.0) -> None:
     n = laid.machine
     for place in {int(n[k]) for k in ("rotor", "shaft", "disk")} | {int(n["mode"])} - {0}:
         laid.axis[place], laid.axis[place + 1] = position, velocity
+    stand_train(laid.train, position)

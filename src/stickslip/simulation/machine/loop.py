@@ -28,6 +28,7 @@ from stickslip.simulation.compiled_controller import Sampled, compiled
 from stickslip.simulation.machine.drive import COLUMNS, NO_NUMBER, TRIPPED, UNITS, Loop, Output, drive
 from stickslip.simulation.machine.layout import TOLERANCE, lay_out_machine, stand_at
 from stickslip.simulation.metrics import metrics, settle_band_of
+from stickslip.simulation.train.layout import cannot_locate
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout
 
@@ -78,10 +79,10 @@ def simulate_machine(
         own = replace(machine, contact=replace(machine.contact, friction=friction))
     control, told = sampled_on(controller, machine, slip_rule)
     places = rows_at(output, machine.sample_time, duration)
-    runs = [_run(own, control, reference, duration, places, initial, tolerance)]
+    runs = [_run(own, control, reference, duration, places, initial, tolerance, metered)]
     substeps = int(runs[0].laid.now["taken"])
     if check and runs[0].code == 0:
-        runs.append(_run(own, control, reference, duration, places, initial, 0.01 * tolerance))
+        runs.append(_run(own, control, reference, duration, places, initial, 0.01 * tolerance, False))
     meta: dict[str, Any] = {
         "what": "simulation", "version": stickslip.__version__, "integrator": "machine", "slip_rule": slip_rule,
         "slip_rules": slip_rules(friction=own.contact.friction, **told.pop("laws")),
@@ -89,6 +90,8 @@ def simulate_machine(
         "friction": own.contact.friction.as_dict(), "machine": machine.as_dict(), "reference": reference.as_dict(),
         "sample_time": machine.sample_time, "counts": {"samples": runs[0].samples, "substeps": substeps}, **told,
     }  # fmt: skip
+    if not runs[0].laid.machine["located"]:
+        meta["general_step"] = cannot_locate(own)
     if learned := after(controller, runs[0].state, machine.sample_time):
         meta["learned"] = learned
     if len(runs) == 2:
@@ -181,7 +184,7 @@ class _Ran:
 
 def _run(
     machine: Machine, control: Sampled, reference: Reference, duration: float,
-    places: np.ndarray[Any, np.dtype[np.int64]], initial: tuple[float, float], tolerance: float,
+    places: np.ndarray[Any, np.dtype[np.int64]], initial: tuple[float, float], tolerance: float, metered: bool,
 ) -> _Ran:  # fmt: skip
     """One run from rest in the contact."""
     laid = lay_out_machine(machine, tolerance)
@@ -196,6 +199,6 @@ def _run(
     output = Output(
         places, np.zeros((places.size, len(COLUMNS))),
         new_meter(samples * machine.sample_time, settle_band_of(reference, duration)), np.zeros((4096, 2)),
-        np.zeros((SIGNALS, 5)), np.zeros(2, dtype=np.int64),
+        np.zeros((SIGNALS, 5)), np.zeros(2, dtype=np.int64), metered,
     )  # fmt: skip
     return _Ran(loop, output, int(drive(loop, samples, output)))

@@ -35,6 +35,8 @@ MACHINE = np.dtype(
             "coarsest", "resolving", "unresolved",
             # In shortest sub-steps.
             "delay", "seed",
+            # Whether the motion is the located flow of its train.
+            "located",
         )),
         *((name, np.float64) for name in (
             "sample_time", "torque_constant", "current_limit", "command_step", "monitor_step", "current_noise",
@@ -95,6 +97,9 @@ class Laid(NamedTuple):
         The law's states; after the sub-step that is tried; in its middle.
     parameters, surroundings : array
         Of the law.
+    train : array
+        Of its located flow (`stickslip.simulation.train.records`); a single 0 where it takes sub-steps. It knows where
+        it and the parameters are: a copy needs one of its own.
     step, holding : int
         Addresses of the law's functions; 0 where it has none.
     """
@@ -108,6 +113,7 @@ class Laid(NamedTuple):
     contact: Any
     parameters: Any
     surroundings: Any
+    train: Any
     step: int
     holding: int
 
@@ -134,6 +140,7 @@ class Plant(NamedTuple):
     contact: Any
     parameters: Any
     surroundings: Any
+    train: Any
     step: int
     holding: int
 
@@ -144,5 +151,5 @@ def plant_of(laid: Laid) -> Plant:
     return Plant(
         record_at(pointer(laid.numbers, 0), MACHINE), record_at(pointer(laid.memory, 0), NOW), pointer(laid.waves, 0),
         pointer(laid.matrix, 0), pointer(laid.search, 0), pointer(laid.axis, 0), pointer(laid.contact, 0),
-        pointer(laid.parameters, 0), pointer(laid.surroundings, 0), laid.step, laid.holding,
+        pointer(laid.parameters, 0), pointer(laid.surroundings, 0), pointer(laid.train, 0), laid.step, laid.holding,
     )  # fmt: skip

@@ -25,7 +25,14 @@ from stickslip.simulation.case_arrays import (
     Case,
     Side,
 )
-from stickslip.simulation.exact.engine import curve_of, is_literal, layer_of, lowest
+from stickslip.simulation.exact.engine import (
+    crosses_once,
+    curve_of,
+    is_literal,
+    layer_of,
+    lowest,
+    modulations,
+)
 from stickslip.simulation.exact.flow import flow, linear
 from stickslip.simulation.sampled.modes import gather
 from stickslip.simulation.sampled.rates import (
@@ -68,6 +75,26 @@ class Laid(NamedTuple):
     springs: Any
 
 
+def not_located(side: Side) -> str:
+    """Say why a contact has no located flow, in one sentence; "" if it has one."""
+    assert side.model is not None
+    law = side.model.law
+    if law.reads_surroundings:
+        return f"law {law.name!r} depends on its surroundings ({modulations(law)})"
+    e = side.elements
+    if e is None:
+        return f"law {law.name!r} gives no `modes`"
+    if not e.constant_curve and (not side.pointers.sliding or e.velocity_scale <= 0.0):
+        return f"law {law.name!r} has no sliding curve with a velocity scale"
+    if isinstance(e, Elements):
+        rigid = [math.isinf(k) for k in e.stiffness]
+        if any(rigid) and not (all(rigid) and math.isinf(e.attraction)):
+            return f"law {law.name!r} has rigid elements in addition to springs, or with a finite attraction"
+        if math.isfinite(e.slope) and not (all(rigid) and crosses_once(side, e)):
+            return f"law {law.name!r} has a steep slope that meets the sliding curve more than once, or never"
+    return ""
+
+
 def general_axis(case: Case) -> Laid:
     """An axis that takes the general step: it has no springs."""
     n = case.numbers
@@ -88,25 +115,31 @@ def axis_of(case: Case) -> Laid:
     """An axis whose motion is a located flow."""
     e, n, side = case.plant.elements, case.numbers, case.plant
     assert e is not None
-    known = levels_of(side, e)
     axis, state, _ = general_axis(case)
     a, z = axis[0], state[0]
-    a["local"], a["literal"] = LOCAL * n[TOLERANCE], int(is_literal(side))
-    a["viscous"], a["breakaway"] = e.viscous, e.breakaway
+    a["local"] = LOCAL * n[TOLERANCE]
+    z["velocity"], z["goal"] = n[VELOCITY_0], 0.0
+    springs = contact_on(a, z, side, e)
+    a["near"] = NEAR * a["local"] * z["spring"]
+    a["glide"] = glide_of(a)
+    if z["spring"] > 0.0:
+        a["flow"] = flow(linear(a["inertia"], a["viscous"], z["spring"]), a["sample_time"])
+    return Laid(axis, state, springs)
+
+
+def contact_on(a: Any, z: Any, side: Side, e: Elements | Bristle) -> Any:
+    """Write the constants of a contact into those of an axis, and how it starts; returns its springs."""
+    known = levels_of(side, e)
+    a["literal"], a["viscous"], a["breakaway"] = int(is_literal(side)), e.viscous, e.breakaway
     a["parameters"] = side.parameters.ctypes.data
     a["curve"], a["scale"] = (0, 1.0) if e.constant_curve else (side.pointers.sliding, e.velocity_scale)
     a["lowest"], a["floor"] = lowest(side, e), known.floors
     springs = fill_bristle(a, e) if isinstance(e, Bristle) else fill_elements(a, side, e)
     a["springs"], a["count"] = springs.ctypes.data, springs.size
-    z["velocity"], z["goal"] = n[VELOCITY_0], 0.0
+    a["far"], a["level"] = known.far, known.level
     z["mode"] = starting_mode(a, z, springs)
     gather(a, z)
-    a["near"] = NEAR * a["local"] * z["spring"]
-    a["far"], a["level"] = known.far, known.level
-    a["glide"] = glide_of(a)
-    if z["spring"] > 0.0:
-        a["flow"] = flow(linear(a["inertia"], a["viscous"], z["spring"]), a["sample_time"])
-    return Laid(axis, state, springs)
+    return springs
 
 
 def fill_bristle(a: Any, e: Bristle) -> Any:

@@ -38,17 +38,15 @@ from stickslip.simulation.case_arrays import (
     surroundings,
 )
 from stickslip.simulation.compiled_controller import Sampled, compiled, measured_position
-from stickslip.simulation.exact.engine import crosses_once, modulations
 from stickslip.simulation.metrics import settle_band_of
 from stickslip.simulation.recorded_input.contact import Plant
-from stickslip.simulation.sampled.axis import axis_of, general_axis
+from stickslip.simulation.sampled.axis import axis_of, general_axis, not_located
 from stickslip.simulation.sampled.general import Contact, act_on, contact_of, hold, plant_of, step_on
 from stickslip.simulation.sampled.modes import creep, friction, rest, sign
 from stickslip.simulation.sampled.output import PROGRESS, Output, measure, put_out, with_room, write
 from stickslip.simulation.sampled.rates import BENDS, HOLDS, RESTS, SLIPS, STEPS, STUCK
 from stickslip.simulation.sampled.slip import slip
 from stickslip.simulation.sampled.stick import stick
-from stickslip.spec import Elements
 from stickslip.waiting import Reached, watched
 
 NUDGE = 1e-11
@@ -76,23 +74,7 @@ def can_run(case: Case) -> str:
 
 def cannot_locate(case: Case) -> str:
     """Say why the motion of `case` is no located flow but takes general steps, in one sentence; "" if it is one."""
-    side = case.plant
-    assert side.model is not None
-    law = side.model.law
-    if law.reads_surroundings:
-        return f"law {law.name!r} depends on its surroundings ({modulations(law)})"
-    e = side.elements
-    if e is None:
-        return f"law {law.name!r} gives no `modes`"
-    if not e.constant_curve and (not side.pointers.sliding or e.velocity_scale <= 0.0):
-        return f"law {law.name!r} has no sliding curve with a velocity scale"
-    if isinstance(e, Elements):
-        rigid = [math.isinf(k) for k in e.stiffness]
-        if any(rigid) and not (all(rigid) and math.isinf(e.attraction)):
-            return f"law {law.name!r} has rigid elements in addition to springs, or with a finite attraction"
-        if math.isfinite(e.slope) and not (all(rigid) and crosses_once(side, e)):
-            return f"law {law.name!r} has a steep slope that meets the sliding curve more than once, or never"
-    return ""
+    return not_located(case.plant)
 
 
 def run(case: Case) -> Outcome:
