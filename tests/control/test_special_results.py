@@ -23,7 +23,7 @@ from stickslip.simulation.machine.layout import look
 from stickslip.spec import Surroundings
 from support.golden_rows import INERTIA, ROWS
 
-SIGMA2, COUNTS, PHASES = 0.018, 65536.0, 8
+SIGMA2, COUNTS, PHASES, MANY_PHASES = 0.018, 65536.0, 8, 24
 HIGH = ss.Reference("sine", amplitude=0.5, frequency=0.1)
 STEP = ss.Reference("step", amplitude=0.01, tau=0.02)
 ENDS, LATE = 61.0, 31.0  # s: a second of motion, a minute at rest, whose second half is judged
@@ -49,10 +49,10 @@ def exact_swing(row):
     )  # fmt: skip
 
 
-def coarse_swing(row):
+def coarse_swing(row, phases=PHASES):
     """With 65,536 counts and a sample of delay: the median over the encoder's phases."""
     machine = Machine("thesis", INERTIA, Contact(friction()), encoder=Encoder(counts=COUNTS), delay=1.0)
-    starts = [((k + 0.5) / PHASES * 2.0 * math.pi / COUNTS, 0.0) for k in range(PHASES)]
+    starts = [((k + 0.5) / phases * 2.0 * math.pi / COUNTS, 0.0) for k in range(phases)]
     return float(
         np.median([
             swing(ss.simulate(machine, ROWS[row], STEP, ENDS, metered=False, initial=start)) for start in starts
@@ -85,7 +85,8 @@ def test_what_integrates_hunts_at_rest(row, found, lowest, highest):
 )
 def test_what_is_reset_at_rest_does_not_hunt(row):
     assert exact_swing(row) <= 30e-6
-    assert coarse_swing(row) <= 40e-6
+    # From one start in five it swings on by chance, whoever simulates it.
+    assert coarse_swing(row, MANY_PHASES) <= 40e-6
 
 
 # ---- friction drops by 30 % while the axis moves --------------------------------------------------------------------

@@ -1,8 +1,9 @@
-"""Rows that are lost, and clocks that are written in few digits."""
+"""Rows that are lost, rows that repeat, and clocks that are written in few digits."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import stickslip as ss
 
@@ -29,3 +30,27 @@ def test_a_distance_that_differs_by_a_fifth_is_jitter_whatever_its_last_digit() 
         codes = {f.code for f in found.findings}
         assert "jitter" in codes
         assert "irregular-sampling" not in codes
+
+
+@pytest.mark.parametrize("every", [1.25, 2.0, 5.0])
+@pytest.mark.parametrize("both", [True, False])
+def test_rows_that_repeat_the_row_before_are_told(every: float, both: bool) -> None:
+    """A position that is new in every so many rows of a log that is written faster."""
+    source = np.floor(np.arange(T.size) / every) * every * 1e-3
+    position = np.round(np.interp(source, T, Q), 7)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(T.size)
+    torque = np.interp(source, T, TORQUE + noise) if both else TORQUE + noise
+    (said,) = (
+        f for f in ss.doctor(t=T, position=position, torque=torque).findings if f.code == "repeated-rows"
+    )
+    assert said.level == "warning"
+    assert f"new in every {every:.2g}th row" in said.message
+    assert said.message.endswith("as is the torque" if both else "the torque is not")
+
+
+def test_an_axis_that_stops_for_some_rows_repeats_none() -> None:
+    """Short steps with dwells of ten rows: it does not catch up behind them."""
+    phase = np.arange(T.size) % 40
+    way = np.cumsum(np.where(phase < 30, 1e-3 * np.sin(np.pi * phase / 30.0) ** 2, 0.0))
+    found = ss.doctor(t=T, position=np.round(way, 6), torque=0.3 + 0.01 * np.cos(T))
+    assert "repeated-rows" not in {f.code for f in found.findings}

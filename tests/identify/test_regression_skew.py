@@ -52,6 +52,34 @@ def test_a_skew_of_many_rows_is_found_and_taken_out(logs: Any) -> None:
     assert np.max(np.abs(moved.drive - log.torque)[20:-20]) < 0.05 * np.max(np.abs(log.torque))
 
 
+@pytest.mark.parametrize("late", [0.06, 0.1])
+@pytest.mark.parametrize("kind", ["clean", "backlash"])
+def test_a_torque_that_comes_a_tenth_of_a_second_late_is_told_and_taken_out(
+    logs: Any, kind: str, late: float
+) -> None:
+    """As robots log it, whose effort comes by another message; strokes are much longer."""
+    log = logs.draw(1500005, "actual", 500, "feedforward", "staircase", kind)
+    k = round(500 * late)
+    moved = Experiment("late", log.time[k:] - log.time[k], log.position[k:], log.torque[:-k])
+    found = regress_axis([moved], AXIS)
+    assert found.numbers["skew"].value == pytest.approx(log.truth["skew"] + late, abs=5e-4)
+    low, high = found.interval("inertia")
+    assert low <= log.truth["inertia"] <= high
+    table = Record(
+        moved.time,
+        {"position": moved.position, "motor_torque": log.torque[:-k]},
+        {"position": "rad", "motor_torque": "N·m"},
+    )
+    (said,) = (f for f in examine(table).findings if f.code == "time-skew")
+    assert f"{1e3 * late:.0f}" in said.message or f"{1e3 * late + 2:.0f}" in said.message
+
+
+def test_an_axis_that_dwells_at_every_reversal_has_no_late_torque(logs: Any) -> None:
+    """A slow sine whose acceleration does not show: its torque turns as late as friction lets the axis go."""
+    log = logs.draw(1500003, "mean", 250, "feedforward", "sine", "backlash")
+    assert "time-skew" not in {f.code for f in examine(record(log)).findings}
+
+
 @pytest.mark.parametrize("rows", [-5, 5])
 @pytest.mark.parametrize("motion", ["production", "staircase"])
 def test_a_delay_of_many_rows_is_one_beside_play_and_noise(logs: Any, motion: str, rows: int) -> None:

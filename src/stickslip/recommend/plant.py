@@ -20,6 +20,7 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.machines.rigid import RigidAxis
 from stickslip.simulation.machine.layout import Laid, lay_out_machine
+from stickslip.simulation.train.layout import seat
 
 
 @dataclass(frozen=True)
@@ -101,16 +102,18 @@ def laid_out(plant: RigidAxis, sample_time: float, counts: float) -> Laid:
     # A run changes all but its flows, which are most of it.
     arrays: dict[str, Any] = {name: x for name, x in laid._asdict().items() if isinstance(x, np.ndarray)}
     copies = {name: x.copy() for name, x in arrays.items()}
+    seat(copies["train"], copies["parameters"])
     return laid._replace(**{**copies, "matrix": laid.matrix})
 
 
 def laid_anew(own: Plant, sample_time: float, counts: float) -> Laid:
     """The same, for a plant that was not yet laid out for such a drive."""
-    laid = lay_out_machine(own.built(sample_time, counts), located=False)
+    beside = [(0.0, -own.offset, 0.0)] if own.offset != 0.0 else []
+    beside += own.waves
+    laid = lay_out_machine(own.built(sample_time, counts), located=not beside)
     laid.surroundings[1], laid.surroundings[2] = own.load, own.temperature
     n = laid.machine
-    beside = [(0.0, -own.offset, 0.0), *own.waves]
     known = laid.waves[: 3 * int(n["ripples"] + n["cogs"])]
     n["cogs"] += len(beside)
-    n["order"] = max(n["order"], *(abs(order) for order, _, _ in beside))
+    n["order"] = max(float(n["order"]), *(abs(order) for order, _, _ in beside), 0.0)
     return laid._replace(waves=np.concatenate([known, np.array(beside).ravel()]))

@@ -39,9 +39,8 @@ FIRST: tuple[Callable[[View], Iterator[Finding]], ...] = (
 CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
     *FIRST, timing.scale, units.assumed, units.counted,
     units.degrees, units.turns, units.reference_scale, units.velocity_scale, units.too_fast, units.torque_scale,
-    spikes.spikes,
-    signals.wrapped, signals.saturated, signals.supply, signals.quantised, physics.sign, physics.skew, physics.gravity,
-    play.backlash, change.changes, change.temperature, excitation.moved,
+    spikes.spikes, signals.wrapped, signals.repeated, signals.saturated, signals.supply, signals.quantised,
+    physics.sign, physics.skew, physics.gravity, play.backlash, change.changes, change.temperature, excitation.moved,
 )  # fmt: skip
 
 

@@ -27,6 +27,12 @@ STRETCHES, SURE = 12, 3.0
 """Stretches of the jackknife of friction's work, and its standard deviations below zero that make an error."""
 UNEXPLAINED = 0.5
 """Of the torque, that may be left in certain sliding for a time to be believed."""
+LATE, STROKE, EARLY = 0.12, 0.25, 0.03
+"""s over which such a delay is looked for: farther only within a part of the usual stroke, so far in any case."""
+SHOWS = 2.0
+"""Times as much that is left without an inertia, where such a delay is told that is longer than `EARLY`."""
+ROUGHLY = 0.15
+"""Of one longer than `EARLY`, by which it may be wrong: wind-up and play shift reversals, too."""
 MANY, CLEARLY, HARM = 9, 10.0, 1e-3
 """Rows from which on a delay that reversals alone show is told, how many times as much none must leave, and part of the
 torque's variance that this must be. Play, wind-up, tuning steps and flexible trains left 3 times as much at most where
@@ -131,7 +137,8 @@ def skew(view: View) -> Iterator[Finding]:
     sure = shows and found.numbers["inertia"].told_to_two and found.confirmed("skew")
     untold = not sure or half > MANY * row
     if untold and (at_reversals := _skew_at_reversals(smooth)) is not None:
-        late, half, sure = at_reversals, smooth.period, True
+        late, sure = at_reversals, True
+        half = ROUGHLY * abs(late) if abs(late) > EARLY else smooth.period
     if not (shows or sure):
         return
     told, beyond = f"{abs(late) * 1e3:.3g} ms (±{half * 1e3:.2g})", abs(late) - half
@@ -155,13 +162,34 @@ def _skew_at_reversals(smooth: Smooth) -> float | None:
 
     Play, wind-up, ringing and a feedforward shift reversals too: it is asked only where sliding does not tell.
     """
-    reach = int(min(max(0.03 / smooth.period, 10), 60, smooth.velocity.size // 8))
-    rests = _rests(smooth, range(-reach, reach + 1))
+    reach = _reach(smooth)
+    coarse = np.arange(-reach, reach + 1, max(1, reach // 30))
+    near = coarse[np.argmin(_rests(smooth, coarse, reach))]
+    shifts = np.union1d(
+        coarse, np.arange(max(near - reach // 30, -reach), min(near + reach // 30, reach) + 1)
+    )
+    shifts = np.union1d(shifts, [0])
+    rests = _rests(smooth, shifts, reach)
     best = int(np.argmin(rests))
     least = max(CLEARLY * float(rests[best]), HARM * float(np.var(smooth.torque)))
-    if abs(best - reach) < MANY or best in (0, 2 * reach) or rests[reach] < least:
+    if abs(shifts[best]) < MANY or best in (0, shifts.size - 1) or rests[shifts == 0][0] < least:
         return None
-    return (best - reach) * smooth.period
+    late = float(shifts[best]) * smooth.period
+    if abs(late) > EARLY:
+        # Where the axis dwells at every reversal its torque turns late, too; what accelerates it does not.
+        without = _rests(smooth, [int(shifts[best])], reach, accelerates=False)[0]
+        if without < SHOWS * rests[best]:
+            return None
+    return late
+
+
+def _reach(smooth: Smooth) -> int:
+    """Samples over which a delay is looked for: no more than a part of a stroke, which would fit the one before."""
+    sides = np.sign(smooth.velocity[smooth.moving])
+    strokes = 1 + np.count_nonzero(np.diff(sides))
+    stroke = np.count_nonzero(smooth.moving) / strokes
+    most = max(min(LATE / smooth.period, STROKE * stroke), min(EARLY / smooth.period, 60.0), MANY + 1.0)
+    return int(min(most, smooth.velocity.size // 8))
 
 
 def gravity(view: View) -> Iterator[Finding]:
@@ -254,10 +282,11 @@ def _fit(
     return Fit(values / size, 1.0 - rest / spread if spread > 0.0 else 0.0, rest)
 
 
-def _rests(smooth: Smooth, shifts: Iterable[int]) -> Array:
-    """`Fit.rest` with the torque taken so many samples later, shape (shifts,)."""
-    rows = _rows(smooth)
-    matrix = _matrix(smooth, rows, measured=False)
+def _rests(smooth: Smooth, shifts: Iterable[int], reach: int = 60, *, accelerates: bool = True) -> Array:
+    """`Fit.rest` with the torque taken so many samples later, at most `reach`, shape (shifts,); with an inertia or
+    without."""
+    rows = _rows(smooth, reach)
+    matrix = _matrix(smooth, rows, measured=False)[:, 0 if accelerates else 1 :]
     basis, sizes, _ = np.linalg.svd(matrix / _sizes(matrix), full_matrices=False)
     basis = basis[:, sizes > RANK * sizes[0]]
     torques = np.stack([smooth.torque[rows + k] for k in shifts])
@@ -271,10 +300,10 @@ def _sizes(matrix: Array) -> Array:
     return np.where(size == 0.0, 1.0, size)
 
 
-def _rows(smooth: Smooth) -> Any:
-    """Rows that move, away from the ends, no more than are needed."""
+def _rows(smooth: Smooth, reach: int = 60) -> Any:
+    """Rows that move, so many away from the ends, no more than are needed."""
     count = smooth.velocity.size
-    edge = min(60, count // 8)
+    edge = min(max(reach, 60), count // 8)
     rows = np.flatnonzero(smooth.moving[edge : count - edge]) + edge
     return rows[:: max(1, rows.size // ROWS)]
 

@@ -26,6 +26,10 @@ NEAR, AT_ONCE, ELSEWHERE = 0.05, 3.0, 0.2
 """Of the range: values beside an extreme; steps of a rounded column, from more than which a limit is reached at once;
 share of the rows that stand still elsewhere, from which on an extreme must stand out from all of its size. Of 187 + 240
 logs those at their limit in 0.35 % of the rows are found, but two of which six rows show it, and no other."""
+COUNTED, SOURCE, REPEATED, CATCHES_UP, FEWEST = 3.0, 20, 0.15, 1.15, 50
+"""Steps of the encoder by which a row moves on where its position must be a new one; rows on end that a slow source may
+repeat: at a stop there are more; share of those rows from which on it is told; times the way of a row that a new
+position is away from one that stood; and how many rows there must be."""
 LOST = 1.5
 """Times from row to row, from which on a row is missing."""
 LEAPS = 99.0
@@ -148,6 +152,43 @@ def supply(view: View) -> Iterator[Finding]:
         )
         name = shlex.quote(f"supply={view.name('voltage')}")
         yield Finding("warning", "supply-voltage", message, remedy=f"say --map {name} --map voltage=none")
+
+
+def repeated(view: View) -> Iterator[Finding]:
+    """Rows that say again what was measured before: the file is written faster than its source."""
+    smooth = view.smooth
+    if smooth is None or not view.has("position"):
+        return
+    time, grid = view.time, np.linspace(view.time[0], view.time[-1], smooth.velocity.size)
+    speed = np.abs(np.interp(time[1:], grid, smooth.velocity))
+    moves = (speed > 0.05 * smooth.fast) & (speed * np.diff(time) > COUNTED * view.step)
+    steps = np.abs(np.diff(view.values("position")))
+    stands = _briefly(steps == 0.0, SOURCE)
+    if np.count_nonzero(moves) < FEWEST or float(np.mean(stands[moves])) < REPEATED:
+        return
+    # An axis that stops and goes on does not catch up.
+    late = np.flatnonzero((stands & moves)[:-1] & ~stands[1:]) + 1
+    if not late.size or float(np.median(steps[late] / (speed * np.diff(time))[late])) < CATCHES_UP:
+        return
+    share, channel = float(np.mean(stands[moves])), view.torque_channel
+    both = channel != "" and float(np.mean(np.diff(view.values(channel))[moves & stands] == 0.0)) > 0.9
+    first = int(np.flatnonzero(view.usable)[np.argmax(moves & stands) + 1])
+    message = (
+        f"position stands in {100 * share:.3g} % of the rows in which the axis moves by more than {COUNTED:g} steps:"
+        f" it is new in every {1.0 / (1.0 - share):.2g}th row, "
+        + ("as is the torque" if both else "the torque is not")
+    )
+    remedy = "log at the rate of the source, or keep the rows whose position is new"
+    yield Finding("warning", "repeated-rows", message, row(first, view), remedy)
+
+
+def _briefly(mask: Any, longest: int) -> Mask:
+    """Where a mask is True for at most so many rows on end."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    out = np.zeros(mask.size, dtype=np.bool_)
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        out[begin:end] = end - begin <= longest
+    return out
 
 
 def _longest(mask: Any) -> int:

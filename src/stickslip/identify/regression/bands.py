@@ -24,6 +24,8 @@ from stickslip.identify.regression.sliding_rows import FEWEST, Fall, Signals, Sl
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
 BANDS = (1.0, 1.6, 2.6)
 """Widths of the windows, in that of the narrowest which noise allows."""
 ROUGH, WIDER = 0.05, (1.6, 2.6, 4.1, 6.6, 10.0)
@@ -35,8 +37,9 @@ windows may leave which are rough as well."""
 LEVELS = 18
 """Stribeck velocities that are averaged over, from `SLOWEST` to `FASTEST` of the highest speed."""
 SLOWEST, FASTEST = 1e-3, 3.0
-LOOKED, CLEAR = 0.04, 0.5
-"""s over which a skew is looked for at a glance; part of the misfit without one that it must leave at most."""
+LOOKED, FARTHEST, STROKE, CLEAR = 0.04, 0.12, 0.25, 0.5
+"""s over which a skew is looked for at a glance, and how far at most within a part of the usual stroke; part of the
+misfit without one that it must leave at most."""
 USUALLY = 2.0
 """Standard deviations of the usual skew from which on one is unusual."""
 CLEARLY, THROUGHOUT = 3.0, 1.7
@@ -241,20 +244,37 @@ def orders_in(
 def clear_skew(signals: Sequence[Signals], width: float) -> float:
     """A skew of some rows that shows at a glance, s; 0 where none does: where the search begins."""
     rows = [sliding_rows(s, Window(width, s.period)) for s in signals]
-    reach = math.ceil(LOOKED / max(s.period for s in signals))
-    left = np.zeros(2 * reach + 1)
+    reach = reach_of(rows)
+    coarse = np.union1d(np.arange(-reach, reach + 1, max(1, reach // 20)), [0])
+    near = int(coarse[np.argmin(misfits(rows, coarse))])
+    fine = np.arange(max(near - reach // 20, -reach), min(near + reach // 20, reach) + 1)
+    shifts = np.union1d(coarse, fine)
+    left = misfits(rows, shifts)
+    best = int(np.argmin(left))
+    if best in (0, shifts.size - 1) or left[best] > CLEAR * float(left[shifts == 0][0]):
+        return 0.0
+    return float(shifts[best]) * rows[0].signals.period
+
+
+def reach_of(rows: Sequence[SlidingRows]) -> int:
+    """Rows over which a skew is looked for: far only within a part of the usual stroke, which would fit the next."""
+    period = max(r.signals.period for r in rows)
+    strokes = [r.time.size / (1 + np.count_nonzero(np.diff(r.fixed[:, 2]))) for r in rows]
+    return math.ceil(max(LOOKED, min(FARTHEST, STROKE * period * float(np.mean(strokes)))) / period)
+
+
+def misfits(rows: Sequence[SlidingRows], shifts: Array) -> Array:
+    """What certain sliding leaves with the torque taken so many rows later, shape (shifts,)."""
+    left = np.zeros(len(shifts))
     for r in rows:
         size = np.linalg.norm(r.fixed, axis=0)
         basis, _ = np.linalg.qr(r.fixed / np.where(size > 0.0, size, 1.0))
         (drive,) = seen(r.signals.drive, r.window.weights(0))
-        for k in range(-reach, reach + 1):
+        for i, k in enumerate(shifts.tolist()):
             torque = drive[np.clip(r.places + k, 0, drive.size - 1)] - r.signals.loss * r.speed
             told = basis.T @ torque
-            left[k + reach] += float(torque @ torque - told @ told)
-    best = int(np.argmin(left))
-    if best in (0, 2 * reach) or left[best] > CLEAR * left[reach]:
-        return 0.0
-    return (best - reach) * rows[0].signals.period
+            left[i] += float(torque @ torque - told @ told)
+    return left
 
 
 def rows_of(

@@ -99,7 +99,7 @@ class Laid(NamedTuple):
         Of the law.
     train : array
         Of its located flow (`stickslip.simulation.train.records`); a single 0 where it takes sub-steps. It knows where
-        it and the parameters are: a copy needs one of its own.
+        it and the parameters are (`stickslip.simulation.train.layout.seat`).
     step, holding : int
         Addresses of the law's functions; 0 where it has none.
     """

@@ -129,14 +129,23 @@ def lay_out_train(machine: Machine, parameters: Array, tolerance: float) -> Arra
     axis["inertia"], axis["sample_time"] = machine.inertia, machine.sample_time
     axis["local"], stiff = SHARE * tolerance, math.fsum(e.stiffness)
     axis["near"] = NEAR * axis["local"] * stiff
-    springs = out[springs_at:].view(SPRING)
-    springs[:] = contact_on(axis, z, plan.side, e)
     # Behind the rest, so that one array is all of it.
-    axis["springs"], axis["parameters"] = springs.ctypes.data, parameters.ctypes.data
+    out[springs_at:].view(SPRING)[:] = contact_on(axis, z, plan.side, e)
+    seat(out, parameters)
     out[TABLES:SYSTEMS] = tables()
     write(out, plan.system)
     prepare(out, stiff)
     return out
+
+
+def seat(train: Array, parameters: Array) -> None:
+    """Let a train, which may be a copy of another, know where its springs and its law's parameters lie."""
+    if train.size > 1:
+        axis = train[AT : AT + AXIS.itemsize // 8].view(AXIS)[0]
+        springs_at = (
+            BLOCKS + (1 + KINDS * (int(train[: TRAIN.itemsize // 8].view(TRAIN)[0]["deepest"]) + 1)) * BLOCK
+        )
+        axis["springs"], axis["parameters"] = train[springs_at:].ctypes.data, parameters.ctypes.data
 
 
 def sliding(machine: Machine, viscous: float) -> StateSpace:
