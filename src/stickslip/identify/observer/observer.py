@@ -39,6 +39,8 @@ TOLERATED = 3e-3
 """Part of friction that a wrong velocity may make it add."""
 LONGEST = 1e-3
 """Longest step of the simulation, s, but for what equally spaced samples may differ by."""
+FINELY = 8.0
+"""Steps of a row that are enough where rows are long: no band of theirs is seen finer."""
 FORGOTTEN = (8.0, 4.0)
 """Periods of the observer's natural frequency after which little is left of how it began, where the axis slides; the
 second where the first leaves a segment longer than `SHORT`. Within an encoder's count nothing pulls: it takes many."""
@@ -164,7 +166,7 @@ def prepare(
         spring=inertia * omega**2, damping=np.where(firm > 0.0, firm, 2.0 * inertia * omega),
         goal=np.where(firm > 0.0, seen.velocity, np.append(np.diff(motion.position) / dt, 0.0)), firm=firm > 0.0,
         forgets=-math.expm1(-LAG * omega * dt), returns=RETURNS * omega, slack=0.5 * motion.count,
-        max_step=1.001 * min(dt, LONGEST),
+        max_step=1.001 * min(dt, max(LONGEST, dt / FINELY)),
     )  # fmt: skip
     low_pass = ZeroPhase(butterworth_poles(4), band, 1.0 / dt)
     stride = max(1, int(1.0 / (3.0 * band * dt)))
