@@ -113,6 +113,8 @@ def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: st
             for k in ("inertia", "offset", "gravity", "gravity_angle", "drive_gain", "back_emf", "load_motor",
                       "load_external", "backlash")
         }  # fmt: skip
+    elif "constant_torque" in found.details:
+        out["axis"] = {"offset": float(found.details["constant_torque"])}
     if isinstance(axis, ServoAxis):
         out["axis"] = out.get("axis", {}) | {"seen_from": axis.seen_from, "gear_ratio": axis.gear_ratio}
     angle: Any = found.details.get("angle")

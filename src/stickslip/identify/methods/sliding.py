@@ -15,6 +15,7 @@ from stickslip.identify.methods._records import has_torque, torque_channel
 from stickslip.identify.methods.method import Method, Options, law_of
 from stickslip.identify.sliding.choice import candidates, choose_sliding
 from stickslip.identify.sliding.curve import Array, identify_sliding
+from stickslip.identify.sliding.offset import beside, constant_torque, without
 from stickslip.identify.sliding.segments import sliding_points
 from stickslip.model import Model
 from stickslip.record import Record
@@ -22,8 +23,10 @@ from stickslip.spec import Law
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """A curve of the laws asked for; where none is named, of those of the thesis."""
-    points, notes = sliding_points(records, torque=torque_channel(records, options, "sliding"))
+    """A curve of the laws asked for, where none is named, of those of the thesis; and the constant torque beside it."""
+    measured, notes = sliding_points(records, torque=torque_channel(records, options, "sliding"))
+    constant = constant_torque(measured)
+    points = without(measured, constant)
     if options.laws:
         laws = [law_of(given) for given in options.laws]
         templates = {law.name: template(law, points.velocity, points.torque, options) for law in laws}
@@ -37,6 +40,7 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
         )[1]
     else:
         found = identify_sliding(points, next(iter(templates.values())), noise=options.noise, frozen=frozen)
+    found = beside(found, constant)
     return replace(found, notes=(*notes, *found.notes))
 
 
