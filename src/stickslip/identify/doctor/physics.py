@@ -16,6 +16,7 @@ import numpy as np
 
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import Array, Smooth, View
+from stickslip.identify.fit.shifts import least_between, shifts_looked_at
 
 ROWS = 20_000
 """Rows of a regression: more tell no more."""
@@ -29,6 +30,8 @@ UNEXPLAINED = 0.5
 """Of the torque, that may be left in certain sliding for a time to be believed."""
 LATE, STROKE, EARLY = 0.12, 0.25, 0.03
 """s over which such a delay is looked for: farther only within a part of the usual stroke, so far in any case."""
+BETTER = 2.0
+"""Times as much that any shorter one must leave."""
 SHOWS = 2.0
 """Times as much that is left without an inertia, where such a delay is told that is longer than `EARLY`."""
 ROUGHLY = 0.15
@@ -163,19 +166,20 @@ def _skew_at_reversals(smooth: Smooth) -> float | None:
     Play, wind-up, ringing and a feedforward shift reversals too: it is asked only where sliding does not tell.
     """
     reach = _reach(smooth)
-    coarse = np.arange(-reach, reach + 1, max(1, reach // 30))
-    near = coarse[np.argmin(_rests(smooth, coarse, reach))]
-    shifts = np.union1d(
-        coarse, np.arange(max(near - reach // 30, -reach), min(near + reach // 30, reach) + 1)
-    )
-    shifts = np.union1d(shifts, [0])
-    rests = _rests(smooth, shifts, reach)
+    shifts, rests = shifts_looked_at(lambda these: _rests(smooth, these, reach), reach, 30)
     best = int(np.argmin(rests))
     least = max(CLEARLY * float(rests[best]), HARM * float(np.var(smooth.torque)))
     if abs(shifts[best]) < MANY or best in (0, shifts.size - 1) or rests[shifts == 0][0] < least:
         return None
     late = float(shifts[best]) * smooth.period
     if abs(late) > EARLY:
+        # A shake fits itself some periods later.
+        near = int(EARLY / smooth.period) + 1
+        if (
+            float(rests[best])
+            > least_between(*shifts_looked_at(lambda these: _rests(smooth, these, reach), near, 30)) / BETTER
+        ):
+            return None
         # Where the axis dwells at every reversal its torque turns late, too; what accelerates it does not.
         without = _rests(smooth, [int(shifts[best])], reach, accelerates=False)[0]
         if without < SHOWS * rests[best]:

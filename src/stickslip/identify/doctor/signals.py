@@ -159,7 +159,8 @@ def repeated(view: View) -> Iterator[Finding]:
     smooth = view.smooth
     if smooth is None or not view.has("position"):
         return
-    time, grid = view.time, np.linspace(view.time[0], view.time[-1], smooth.velocity.size)
+    time = view.time
+    grid: Array = np.linspace(float(time[0]), float(time[-1]), smooth.velocity.size)
     speed = np.abs(np.interp(time[1:], grid, smooth.velocity))
     moves = (speed > 0.05 * smooth.fast) & (speed * np.diff(time) > COUNTED * view.step)
     steps = np.abs(np.diff(view.values("position")))
@@ -171,15 +172,17 @@ def repeated(view: View) -> Iterator[Finding]:
     if not late.size or float(np.median(steps[late] / (speed * np.diff(time))[late])) < CATCHES_UP:
         return
     share, channel = float(np.mean(stands[moves])), view.torque_channel
-    both = channel != "" and float(np.mean(np.diff(view.values(channel))[moves & stands] == 0.0)) > 0.9
-    first = int(np.flatnonzero(view.usable)[np.argmax(moves & stands) + 1])
+    again = np.abs(np.diff(view.values(channel or "position")))[moves & stands]
+    both = channel != "" and np.count_nonzero(again == 0.0) > 0.9 * again.size
+    rows: list[int] = np.flatnonzero(view.usable).tolist()
+    where = row(rows[int(np.argmax(moves & stands)) + 1], view)
     message = (
         f"position stands in {100 * share:.3g} % of the rows in which the axis moves by more than {COUNTED:g} steps:"
         f" it is new in every {1.0 / (1.0 - share):.2g}th row, "
         + ("as is the torque" if both else "the torque is not")
     )
     remedy = "log at the rate of the source, or keep the rows whose position is new"
-    yield Finding("warning", "repeated-rows", message, row(first, view), remedy)
+    yield Finding("warning", "repeated-rows", message, where, remedy)
 
 
 def _briefly(mask: Any, longest: int) -> Mask:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.fit.shifts import Whole, least_between, shifts_looked_at
 from stickslip.identify.fit.smooth import Window, seen
 from stickslip.identify.regression.band_fit import QUANTILE, BandFit, Number, fit_band
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
@@ -244,26 +245,30 @@ def orders_in(
 def clear_skew(signals: Sequence[Signals], width: float) -> float:
     """A skew of some rows that shows at a glance, s; 0 where none does: where the search begins."""
     rows = [sliding_rows(s, Window(width, s.period)) for s in signals]
-    reach = reach_of(rows)
-    coarse = np.union1d(np.arange(-reach, reach + 1, max(1, reach // 20)), [0])
-    near = int(coarse[np.argmin(misfits(rows, coarse))])
-    fine = np.arange(max(near - reach // 20, -reach), min(near + reach // 20, reach) + 1)
-    shifts = np.union1d(coarse, fine)
-    left = misfits(rows, shifts)
-    best = int(np.argmin(left))
-    if best in (0, shifts.size - 1) or left[best] > CLEAR * float(left[shifts == 0][0]):
-        return 0.0
-    return float(shifts[best]) * rows[0].signals.period
-
-
-def reach_of(rows: Sequence[SlidingRows]) -> int:
-    """Rows over which a skew is looked for: far only within a part of the usual stroke, which would fit the next."""
     period = max(r.signals.period for r in rows)
-    strokes = [r.time.size / (1 + np.count_nonzero(np.diff(r.fixed[:, 2]))) for r in rows]
-    return math.ceil(max(LOOKED, min(FARTHEST, STROKE * period * float(np.mean(strokes)))) / period)
+    reach = math.ceil(LOOKED / period)
+    shifts, left = shifts_looked_at(lambda these: misfits(rows, these), reach, 20)
+    near, best = least_between(shifts, left), int(np.argmin(left))
+    found = (
+        0
+        if best in (0, shifts.size - 1) or left[best] > CLEAR * float(left[shifts == 0][0])
+        else int(shifts[best])
+    )
+    reach = max(reach, math.floor(min(FARTHEST / period, STROKE * stroke_of(rows))))
+    shifts, left = shifts_looked_at(lambda these: misfits(rows, these), reach, 60)
+    best = int(np.argmin(left))
+    # A shake fits itself some periods later.
+    if 0 < best < shifts.size - 1 and float(left[best]) < CLEAR * near:
+        found = int(shifts[best])
+    return found * rows[0].signals.period
 
 
-def misfits(rows: Sequence[SlidingRows], shifts: Array) -> Array:
+def stroke_of(rows: Sequence[SlidingRows]) -> float:
+    """Rows of certain sliding in one direction, on average."""
+    return sum(r.time.size for r in rows) / sum(1 + np.count_nonzero(np.diff(r.fixed[:, 2])) for r in rows)
+
+
+def misfits(rows: Sequence[SlidingRows], shifts: Whole) -> Array:
     """What certain sliding leaves with the torque taken so many rows later, shape (shifts,)."""
     left = np.zeros(len(shifts))
     for r in rows:
