@@ -44,7 +44,7 @@ def test_rows_that_repeat_the_row_before_are_told(every: float, both: bool) -> N
         f for f in ss.doctor(t=T, position=position, torque=torque).findings if f.code == "repeated-rows"
     )
     assert said.level == "warning"
-    assert f"new in every {every:.2g}th row" in said.message
+    assert f"new once in {every:.2g} rows" in said.message
     assert said.message.endswith("as is the torque" if both else "the torque is not")
 
 

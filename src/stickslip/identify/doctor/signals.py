@@ -178,7 +178,7 @@ def repeated(view: View) -> Iterator[Finding]:
     where = row(rows[int(np.argmax(moves & stands)) + 1], view)
     message = (
         f"position stands in {100 * share:.3g} % of the rows in which the axis moves by more than {COUNTED:g} steps:"
-        f" it is new in every {1.0 / (1.0 - share):.2g}th row, "
+        f" it is new once in {1.0 / (1.0 - share):.2g} rows, "
         + ("as is the torque" if both else "the torque is not")
     )
     remedy = "log at the rate of the source, or keep the rows whose position is new"
