@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
 from stickslip.identify.model_file import model_data
 from stickslip.identify.sliding.offset import constant_torque
@@ -92,3 +93,12 @@ def test_the_method_takes_it_off_and_writes_it_down() -> None:
     assert any("constant torque of 0.0" in note for note in shifted.notes)
     assert model_data(shifted, [])["axis"] == {"offset": pytest.approx(offset.value)}
     assert "axis" not in model_data(known, [])
+
+
+def test_by_direction_a_law_takes_it_up() -> None:
+    """Levels of its own for each direction differ by twice the constant torque, of which none is left."""
+    found = ss.identify(record(0.04), method="sliding", law="coulomb", per_direction=True).identification
+    assert "offset" not in {e.name for e in found.estimates}
+    assert found["fc"].value - found["fc_negative"].value == pytest.approx(0.08, abs=2e-3)
+    with pytest.raises(InputError, match="needs a law; name one"):
+        ss.identify(record(0.04), method="sliding", per_direction=True)

@@ -33,6 +33,7 @@ from stickslip.identify.axis.search import Asked, Extras, fitted_axis, require_s
 from stickslip.identify.axis.settled import ALIKE
 from stickslip.identify.estimate import Estimate, Identification, silent
 from stickslip.identify.experiment import Experiment
+from stickslip.identify.fit.axis_start import each_way
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
 from stickslip.identify.regression.regression import Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
@@ -360,9 +361,3 @@ def first_look(
         )
         notes.append("A torque offset cannot be distinguished from friction that differs by direction.")
     return found, notes
-
-
-def each_way(law: Law) -> Law:
-    """The law with parameters of its own for v < 0, where it may have them."""
-    known = {choice.name for choice in law.choices}
-    return law.having(symmetry="asymmetric") if "symmetry" in known else law

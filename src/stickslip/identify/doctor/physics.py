@@ -172,19 +172,20 @@ def _skew_at_reversals(smooth: Smooth) -> float | None:
     if abs(shifts[best]) < MANY or best in (0, shifts.size - 1) or rests[shifts == 0][0] < least:
         return None
     late = float(shifts[best]) * smooth.period
-    if abs(late) > EARLY:
-        # A shake fits itself some periods later.
-        near = int(EARLY / smooth.period) + 1
-        if (
-            float(rests[best])
-            > least_between(*shifts_looked_at(lambda these: _rests(smooth, these, reach), near, 30)) / BETTER
-        ):
-            return None
-        # Where the axis dwells at every reversal its torque turns late, too; what accelerates it does not.
-        without = _rests(smooth, [int(shifts[best])], reach, accelerates=False)[0]
-        if without < SHOWS * rests[best]:
-            return None
-    return late
+    return (
+        late if abs(late) <= EARLY or _is_far(smooth, int(shifts[best]), float(rests[best]), reach) else None
+    )
+
+
+def _is_far(smooth: Smooth, shift: int, rest: float, reach: int) -> bool:
+    """Whether a shift beyond `EARLY`, which leaves `rest`, is one: neither a shorter one nor dwelling explains it."""
+    near = int(EARLY / smooth.period) + 1
+    shorter = shifts_looked_at(lambda these: _rests(smooth, these, reach), near, 30)
+    # A shake fits itself some periods later.
+    if BETTER * rest > least_between(*shorter):
+        return False
+    # Where the axis dwells at every reversal its torque turns late, too; what accelerates it does not.
+    return bool(_rests(smooth, [shift], reach, accelerates=False)[0] >= SHOWS * rest)
 
 
 def _reach(smooth: Smooth) -> int:

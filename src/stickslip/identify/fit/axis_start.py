@@ -257,3 +257,9 @@ def dimensions_of(unit: str) -> tuple[int, int, int] | None:
         return dimensions(unit)
     except InputError:
         return None
+
+
+def each_way(law: Law) -> Law:
+    """The law with parameters of its own for v < 0, where it may have them."""
+    known = {choice.name for choice in law.choices}
+    return law.having(symmetry="asymmetric") if "symmetry" in known else law

@@ -48,7 +48,7 @@ class Options:
     inverse : bool
         Linear least squares only, no simulation (axis).
     per_direction : bool
-        Friction with parameters of its own for each direction (axis).
+        Friction with parameters of its own for each direction (axis, sliding).
     pendulum : bool
         Gravity is m g l sin(q - q0), otherwise a constant torque (axis).
     drive_gain : float or None

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.estimate import Identification
-from stickslip.identify.fit.axis_start import starts
+from stickslip.identify.fit.axis_start import each_way, starts
 from stickslip.identify.methods._records import has_torque, torque_channel
 from stickslip.identify.methods.method import Method, Options, law_of
 from stickslip.identify.sliding.choice import candidates, choose_sliding
@@ -24,11 +24,15 @@ from stickslip.spec import Law
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """A curve of the laws asked for, where none is named, of those of the thesis; and the constant torque beside it."""
+    if options.per_direction and not options.laws:
+        raise InputError("--method sliding --per-direction needs a law; name one, such as --law coulomb")
     measured, notes = sliding_points(records, torque=torque_channel(records, options, "sliding"))
-    constant = constant_torque(measured)
+    # With levels of its own for each direction a law takes up what a constant torque would.
+    constant = None if options.per_direction else constant_torque(measured)
     points = without(measured, constant)
     if options.laws:
         laws = [law_of(given) for given in options.laws]
+        laws = [each_way(law) for law in laws] if options.per_direction else laws
         templates = {law.name: template(law, points.velocity, points.torque, options) for law in laws}
     else:
         templates = candidates(points.velocity, points.torque, dict(options.values))

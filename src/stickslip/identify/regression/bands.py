@@ -248,19 +248,19 @@ def clear_skew(signals: Sequence[Signals], width: float) -> float:
     period = max(r.signals.period for r in rows)
     reach = math.ceil(LOOKED / period)
     shifts, left = shifts_looked_at(lambda these: misfits(rows, these), reach, 20)
-    near, best = least_between(shifts, left), int(np.argmin(left))
-    found = (
-        0
-        if best in (0, shifts.size - 1) or left[best] > CLEAR * float(left[shifts == 0][0])
-        else int(shifts[best])
-    )
-    reach = max(reach, math.floor(min(FARTHEST / period, STROKE * stroke_of(rows))))
-    shifts, left = shifts_looked_at(lambda these: misfits(rows, these), reach, 60)
-    best = int(np.argmin(left))
-    # A shake fits itself some periods later.
-    if 0 < best < shifts.size - 1 and float(left[best]) < CLEAR * near:
-        found = int(shifts[best])
+    found = clear_in(shifts, left, CLEAR * float(left[shifts == 0][0]))
+    farther = math.floor(min(FARTHEST / period, STROKE * stroke_of(rows)))
+    if farther > reach:
+        # A shake fits itself some periods later: no near shift, nor a part of a row beside it, may leave as little.
+        near = CLEAR * least_between(shifts, left)
+        found = clear_in(*shifts_looked_at(lambda these: misfits(rows, these), farther, 60), near) or found
     return found * rows[0].signals.period
+
+
+def clear_in(shifts: Whole, left: Array, most: float) -> int:
+    """The shift that leaves the least, where that is no more than `most` and lies inside; else 0."""
+    best = int(np.argmin(left))
+    return int(shifts[best]) if 0 < best < shifts.size - 1 and left[best] <= most else 0
 
 
 def stroke_of(rows: Sequence[SlidingRows]) -> float:

@@ -65,13 +65,14 @@ def simulate_machine(
         Whether the run is repeated at a hundredth of the tolerance (the noise is the same): ``meta["accuracy"]`` then
         says by how much both differ at most, ``error_rad``.
     tolerance : float
-        Error in position that a sub-step may make by the end of its sample, rad.
+        Error in position that a sub-step may make by the end of its sample, rad; a located flow's step a tenth of it.
 
     Returns
     -------
     Record
         ``meta["machine"]`` says which machine ran, and what was switched off; ``meta["learned"]`` what the controller
-        has learned (`stickslip.control.learned`); there is no energy balance.
+        has learned (`stickslip.control.learned`); ``meta["general_step"]`` why it moved by sub-steps and along no
+        located flow (decision 0033), where it did; there is no energy balance.
     """
     own = machine
     if slip_rule is not None:
@@ -94,12 +95,7 @@ def simulate_machine(
         meta["general_step"] = cannot_locate(own)
     if learned := after(controller, runs[0].state, machine.sample_time):
         meta["learned"] = learned
-    if len(runs) == 2:
-        apart = np.abs(runs[0].rows[:, 3] - runs[1].rows[:, 3])
-        meta["accuracy"] = {"error_rad": float(np.max(apart, initial=0.0))}
-    if metered and runs[0].code == 0:
-        turns = turning_points(runs[0].meter, runs[0].turns)
-        meta["metrics"] = {k: float(v) for k, v in metrics(runs[0].meter, turns).items()}
+    meta |= _results(runs, metered)
     columns = np.ascontiguousarray(runs[0].rows.T)
     channels = {name: columns[i] for i, name in enumerate(COLUMNS) if name != "time"}
     record = Record(columns[0], channels, UNITS, meta)
@@ -107,6 +103,18 @@ def simulate_machine(
         ended = runs[0].ended
         raise Divergence(f"the run ended at {ended:.6g} s: {REASONS[runs[0].code]}", ended, record)
     return record
+
+
+def _results(runs: list[_Ran], metered: bool) -> dict[str, Any]:
+    """How far two runs lie apart, where there are two, and the metrics of the first."""
+    out: dict[str, Any] = {}
+    if len(runs) == 2:
+        apart = np.abs(runs[0].rows[:, 3] - runs[1].rows[:, 3])
+        out["accuracy"] = {"error_rad": float(np.max(apart, initial=0.0))}
+    if metered and runs[0].code == 0:
+        turns = turning_points(runs[0].meter, runs[0].turns)
+        out["metrics"] = {k: float(v) for k, v in metrics(runs[0].meter, turns).items()}
+    return out
 
 
 def sampled_on(

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from stickslip.jit import WIDTH, columns_times, kernel, pointer
 from stickslip.simulation.sampled.modes import floor_below, heaviest, sign, stays_below
-from stickslip.simulation.sampled.rates import SLIPS, curve_at, spring_of
+from stickslip.simulation.sampled.rates import SLIPS, spring_of
+from stickslip.simulation.sampled.stick import excess as above
 from stickslip.simulation.sampled.stretch import Stretch
 from stickslip.simulation.train.records import (
     ANGLE,
@@ -105,7 +106,7 @@ def goes_on(train: Train) -> bool:
 
 
 @kernel()
-def turn(train: Train, way: float) -> tuple[float, float]:
+def turning_of(train: Train, way: float) -> tuple[float, float]:
     """The part of a step after which the velocity has fallen to 0, and where it is least before; 2: there is none."""
     mem, least = train.all, 2.0
     for i in range(PARTS):
@@ -174,7 +175,7 @@ def sticks(train: Train, h: float) -> Found:
     v = mem[VELOCITY]
     way = sign(v) if v != 0.0 else sign(mem[VELOCITY + 1])
     here = 0.0
-    if excess(train, 0.0, way) >= 0.0 and way != 0.0:
+    if excess(train, 0.0, way) >= 0.0:
         return Found(BREAKS, 0.0, way)
     for i in range(PARTS):
         end = (i + 1.0) / PARTS
@@ -200,7 +201,7 @@ def slides(train: Train, h: float) -> Found:
         return Found(TURNS, 0.0, way)
     if holds and way * mem[VELOCITY] > 0.0 and excess(train, 0.0, way) >= 0.0:
         return Found(BREAKS, 0.0, way)
-    turning, least = turn(train, way)
+    turning, least = turning_of(train, way)
     end = min(turning, 1.0)
     here = 0.0
     while holds and here < end:
@@ -218,11 +219,7 @@ def slides(train: Train, h: float) -> Found:
 @kernel(inline=True)
 def excess(train: Train, at: float, way: float) -> float:
     """How far the heaviest load lies above the curve at a part of the step, N·m."""
-    axis = train.axis
-    load = heaviest(axis, along(train, ANGLE_POWERS, at), way)
-    if load < axis.lowest:
-        return load - axis.lowest
-    return load - curve_at(axis, along(train, VELOCITY_POWERS, at))
+    return above(train.axis, along(train, ANGLE_POWERS, at), along(train, VELOCITY_POWERS, at), way)
 
 
 @kernel()

@@ -40,7 +40,7 @@ RESOLVED = 1.0
 """omega h of the fastest mode, up to which the nodes of a step follow all that it does."""
 WATCHED = 1.1
 """The same between two nodes, up to which they show how far the contact moves."""
-DEEPEST = 8
+MOST_HALVINGS = 8
 """Halvings of a sample for the modes; a machine whose modes need more takes general sub-steps."""
 BEYOND = 4
 """More of them whose flows are kept, for sliding along a steep part of the curve."""
@@ -98,7 +98,7 @@ def plan_of(machine: Machine) -> Plan | str:
         return f"law {law!r} follows a sliding curve at once"
     system, turning = sliding(machine, e.viscous), 5 if machine.flexible else 1
     pace = paces(system, turning, math.fsum(e.stiffness))
-    if len(system.states) > MOST or halvings(max(pace) * machine.sample_time / RESOLVED) > DEEPEST:
+    if len(system.states) > MOST or halvings(max(pace) * machine.sample_time / RESOLVED) > MOST_HALVINGS:
         return "its modes are too many, or too fast for its samples"
     return Plan(side, e, system, turning, pace)
 
