@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
@@ -179,6 +179,7 @@ def test_the_estimate_of_the_error_holds() -> None:
 @given(
     amplitude=st.floats(1e-3, 0.2), frequency=st.floats(0.3, 3.0), start=st.floats(-0.01, 0.01),
 )  # fmt: skip
+@example(amplitude=1.953125e-3, frequency=0.5, start=1.5e-3)
 @settings(max_examples=6, deadline=None)
 def test_a_rigid_machine_moves_as_a_rigid_axis_on_its_own_located_flow(
     name: str, amplitude: float, frequency: float, start: float
@@ -187,15 +188,16 @@ def test_a_rigid_machine_moves_as_a_rigid_axis_on_its_own_located_flow(
     m = rigid(LAWS[name])
     reference = ss.Reference("sine", amplitude=amplitude, frequency=frequency)
     axis = ss.RigidAxis(m.inertia, m.friction)
-    initial = (start, 0.0)
-    one = machine_loop.simulate_machine(
-        m, loop(m), reference, 0.5, metered=False, tolerance=1e-11, initial=initial
+    more = {"metered": False, "tolerance": 1e-11}
+    one = machine_loop.simulate_machine(m, loop(m), reference, 0.5, initial=(start, 0.0), **more)
+    other, beside = (
+        ss.simulate(axis, loop(m), reference, 0.5, initial=(begin, 0.0), output=one.time, **more)
+        for begin in (start, start + 1e-9)
     )
-    other = ss.simulate(
-        axis, loop(m), reference, 0.5, metered=False, tolerance=1e-11, initial=initial, output=one.time
-    )
-    at = other["event"] == 0.0
-    assert np.max(np.abs(one["position"] - other["position"][at])) < 1e-6
+    other, beside = (r["position"][r["event"] == 0.0] for r in (other, beside))
+    # A loop that swings itself up, or a tie that rounding decides, says nothing of either engine.
+    assume(np.max(np.abs(other - beside)) < 1e-7)
+    assert np.max(np.abs(one["position"] - other)) < 1e-6
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -244,7 +246,7 @@ def test_one_sample_at_a_time_is_a_block() -> None:
     ("machine", "why"),
     [
         (train(LUGRE), "not made of springs"),
-        (rigid(ss.Model("dahl", fc=0.3, sigma0=3e4)), "gives no `modes`"),
+        (rigid(ss.Model("dahl", fc=0.3, sigma0=3e4, delta_d=0.5)), "gives no `modes`"),
         (rigid(ss.Model("coulomb", fc=0.3)), "not made of springs"),
         (rigid(cogging=Harmonics((2.0,), (0.01,), (0.0,))), "cogging"),
         (replace(rigid(), contact=Contact(GMS, ripple=Harmonics((2.0,), (0.1,), (0.0,)))), "ripple"),

@@ -173,7 +173,7 @@ def sticks(train: Train, h: float) -> Found:
     """Everything sticks: the step ends where the first element breaks away."""
     mem = train.all
     v = mem[VELOCITY]
-    way = sign(v) if v != 0.0 else sign(mem[VELOCITY + 1])
+    way = sign(v) if v != 0.0 else sign(slope(train, VELOCITY_POWERS, 0.0))
     here = 0.0
     if excess(train, 0.0, way) >= 0.0:
         return Found(BREAKS, 0.0, way)
@@ -197,7 +197,9 @@ def sticks(train: Train, h: float) -> Found:
 def slides(train: Train, h: float) -> Found:
     """Something slips: the step ends where the axis turns, or where an element that holds breaks away."""
     mem, way, holds = train.all, train.z.direction, train.z.spring > 0.0
-    if way * mem[VELOCITY] <= 0.0 and way * mem[VELOCITY + 1] <= 0.0:
+    # By the acceleration, which is the same whether something slips or not: what a slipping force does until the first
+    # node may turn the axis once more, and sticking would start it again, without end.
+    if way * mem[VELOCITY] <= 0.0 and way * slope(train, VELOCITY_POWERS, 0.0) <= 0.0:
         return Found(TURNS, 0.0, way)
     if holds and way * mem[VELOCITY] > 0.0 and excess(train, 0.0, way) >= 0.0:
         return Found(BREAKS, 0.0, way)
