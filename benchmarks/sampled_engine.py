@@ -40,6 +40,7 @@ LAWS = (
     ss.Model("maxwell_slip", k=[1e4, 7e3, 5e3, 3e3], w=[0.08375] * 4, sigma2=0.018),
     ss.Model("coulomb", fc=0.285, sigma2=0.018),
     ss.Model("stribeck", k=3.5e4, **CURVE),
+    *(ss.Model(name, **ss.law(name).example) for name in ("dahl", "elasto_plastic")),
 )
 MOTIONS = {
     "low": (ss.Reference("sine", amplitude=0.01, frequency=0.4), 5.0),
@@ -47,7 +48,7 @@ MOTIONS = {
 }
 OTHERS = tuple(
     ss.Model(name, **ss.law(name).example)
-    for name in ("static", "stribeck_plain", "karnopp", "dahl", "elasto_plastic")
+    for name in ("static", "stribeck_plain", "karnopp", "armstrong", "leuven")
 )
 """Laws without a located flow."""
 ROTOR, SHAFT, DISK = 1.2e-4, 1.2e-4, 1.8757e-4

@@ -196,7 +196,11 @@ class Bristle:
     """A law as one bristle that bends as a spring and gives way in proportion to the distance slid.
 
     dF/dt = stiffness (v - |v| F / s(v)); the torque is F + (damping / stiffness) dF/dt + viscous v: LuGre (thesis eqs.
-    2.8 and 2.9 with F = sigma_0 z), Dahl with shape factor 1. The other fields are those of `Elements`.
+    2.8 and 2.9 with F = sigma_0 z). The other fields are those of `Elements`.
+
+    With ``own_growth`` it gives way by the law's `growth` instead: dF/dt = stiffness v growth(y, limit) with
+    y = F sign(v)/stiffness and limit = s(v)/stiffness (Dahl). Up to ``elastic``, N·m, and while F and v differ in sign,
+    it only bends (elasto-plastic).
     """
 
     stiffness: float
@@ -205,6 +209,8 @@ class Bristle:
     breakaway: float
     velocity_scale: float
     constant_curve: bool = False
+    own_growth: bool = False
+    elastic: float = 0.0
 
 
 def fields_of(description: type | None) -> tuple[Field, ...]:

@@ -22,6 +22,8 @@ Argument order, everywhere: velocity, time step, state ``z``, parameters ``p``, 
 ``check(p)``                           a sentence that says what is wrong with the parameters, or ""
 ``modes(p)``                           the law as `Elements` that stick as springs and slip along one curve, or as
                                        a `Bristle` (what the exact integrator runs on), or None
+``growth(y, limit, p)``                dy/dx of a bristle's deflection in the direction of motion, whose steady value
+                                       is ``limit``, where it is not 1 - y/limit (see `Bristle`)
 ``stored(z, p)``                       energy that the contact could give back, J, where it is defined: the
                                        work done on it less the rise of this is dissipated, never negative
                                        where the law is passive
@@ -82,7 +84,7 @@ __all__ = [
 
 
 FUNCTIONS = (
-    "step", "sampled", "rate", "guards", "switch", "steady", "holding", "check", "modes", "velocity_scale",
+    "step", "sampled", "rate", "guards", "switch", "steady", "holding", "check", "modes", "growth", "velocity_scale",
     "rest_band", "is_passive", "stored",
 )  # fmt: skip
 """A law's functions, all of which may call the chosen options."""
@@ -132,7 +134,7 @@ class Law(Configurable):
         ``Annotated[tuple[float, ...], Par(...)]`` fields. Fields of the chosen options are added to them.
     State : type or None
         As ``Params``, for the internal state.
-    step, sampled, rate, guards, switch, steady, holding, check, modes, stored, rest_band : callable or None
+    step, sampled, rate, guards, switch, steady, holding, check, modes, growth, stored, rest_band : callable or None
         Its functions; only ``step`` must be there.
     variants : dict
         Laws that `having` has made of it; not for callers.
@@ -173,6 +175,7 @@ class Law(Configurable):
     holding: Callable[..., float] | None = None
     check: Callable[[Any], str] | None = None
     modes: Callable[[Any], Elements | Bristle | None] | None = None
+    growth: Callable[..., float] | None = None
     stored: Callable[..., float] | None = None
     velocity_scale: Callable[[Any], float] | None = None
     rest_band: Callable[[Any], float] | None = None

@@ -117,7 +117,7 @@ def test_laws_of_the_package_pass(name):
         assert verdict.passed is not False, verdict
 
 
-@pytest.mark.parametrize("name", ["gms", "coulomb", "lugre"])
+@pytest.mark.parametrize("name", ["gms", "coulomb", "lugre", "dahl", "elasto_plastic"])
 def test_modes_move_an_axis_as_the_rate_does(name, law_of):
     verdict = modes_against_rate(plugins.law(name))
     assert verdict.passed, verdict

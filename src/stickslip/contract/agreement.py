@@ -16,7 +16,7 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.prescribed.open_loop import respond
-from stickslip.spec import Law
+from stickslip.spec import Bristle, Law
 
 LONG, POINTS = 0.6, 60
 """Length of the motion, s, and the moments at which its torques are compared."""
@@ -108,8 +108,11 @@ def steady_is_reached(law: Law) -> Verdict:
 def modes_against_rate(law: Law) -> Verdict:
     """A closed loop by the exact integrator, which runs the elements, and by one that runs the law's own functions."""
     name = "modes"
-    if law.modes is None or law.modes(example(law)) is None:
+    form = law.modes(example(law)) if law.modes else None
+    if form is None:
         return not_tried(name, "the law is not given as elements")
+    if isinstance(form, Bristle) and form.own_growth:
+        return growth_against_step(law, form)
     level = _level(law)
     frequency, amplitude = 20.0, max(0.02, 5.0 * _way(law))
     # So heavy that the controller overcomes the friction five times.
@@ -130,3 +133,38 @@ def modes_against_rate(law: Law) -> Verdict:
     apart = float(np.abs(positions[1] - positions[0]).max()) / amplitude
     said = f"the elements move an axis as {'the rate' if law.rate else 'fine steps'} to {apart:.1g} of the amplitude"
     return held(name, said) if apart <= SAME_LOOP[other == "fixed"] else failed(name, said)
+
+
+def growth_against_step(law: Law, form: Bristle) -> Verdict:
+    """A bristle that its growth bends to and fro at constant speeds has the torque of the law's own steps."""
+    name, p = "modes", example(law)
+    if law.growth is None or law.steady is None:
+        return failed(
+            name, "`modes` says that the bristle has a `growth` of its own; give `growth` and `steady`"
+        )
+    dx = 0.02 * form.breakaway / form.stiffness
+    z, force, worst, level = law.state(p), 0.0, 0.0, _level(law)
+    for v in (1e-3, -1e-4, 3e-2, -1.0, 1e-3):
+        limit = form.breakaway if form.constant_curve else abs(law.steady(v, p) - form.viscous * v)
+        for _ in range(150):
+            torque = law.step(v, v, dx / abs(v), z, p, U)
+            k1 = bending(law, form, force, v, limit)
+            k2 = bending(law, form, force + 0.5 * dx * k1, v, limit)
+            k3 = bending(law, form, force + 0.5 * dx * k2, v, limit)
+            k4 = bending(law, form, force + dx * k3, v, limit)
+            force += dx / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            damped = form.damping / form.stiffness * abs(v) * bending(law, form, force, v, limit)
+            worst = max(worst, abs(torque - force - damped - form.viscous * v) / level)
+    said = f"its growth bends the bristle as the law's steps do, to {worst:.1g} of the level"
+    return held(name, said) if worst <= ENOUGH else failed(name, said)
+
+
+def bending(law: Law, form: Bristle, force: float, v: float, limit: float) -> float:
+    """dF over the distance slid, N·m/rad, of a bristle with a growth of its own."""
+    way = math.copysign(1.0, v)
+    if form.elastic > 0.0 and way * force < form.elastic:
+        return way * form.stiffness
+    assert law.growth is not None
+    return (
+        way * form.stiffness * law.growth(way * force / form.stiffness, limit / form.stiffness, example(law))
+    )

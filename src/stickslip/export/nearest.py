@@ -327,13 +327,13 @@ def losses(curve: Curve, form: Form) -> list[str]:
 
 
 def bristle_of(curve: Curve) -> Bristle | None:
-    """The law's bristle where it is one (LuGre, Dahl), the dependences on direction and surroundings aside."""
+    """The law's bristle where it is one like LuGre's, the dependences on direction and surroundings aside."""
     law, p = curve.model.law, curve.model.parameters
     if law.chosen.get("symmetry") == "asymmetric":
         law, both = law.having(symmetry="symmetric"), p._asdict()
         p = law.parameters({f.name: between(both[f.name], both.get(f.name + NEGATIVE)) for f in law.fields})
     contact = law.modes(p) if law.modes else None
-    return contact if isinstance(contact, Bristle) else None
+    return contact if isinstance(contact, Bristle) and not contact.own_growth else None
 
 
 def between(forth: Any, back: Any) -> Any:

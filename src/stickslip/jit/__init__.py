@@ -7,6 +7,7 @@ signature each, and handed to kernels as addresses: a kernel is compiled once, w
 """
 
 from stickslip.jit.addresses import (
+    call_growth,
     call_guarded,
     call_guards,
     call_holding,
@@ -54,6 +55,7 @@ __all__ = [
     "WIDTH",
     "LawPointers",
     "cache_folder",
+    "call_growth",
     "call_guarded",
     "call_guards",
     "call_holding",

@@ -22,6 +22,7 @@ SIGNATURES = {
     "steady": FLOAT(FLOAT, ARRAY),
     "sliding": FLOAT(FLOAT, ARRAY),
     "holding": FLOAT(FLOAT, ARRAY, ARRAY, ARRAY),
+    "growth": FLOAT(FLOAT, FLOAT, ARRAY),
     "profile": types.void(FLOAT, ARRAY, ARRAY),
     "sample": FLOAT(FLOAT, FLOAT, FLOAT, FLOAT, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
     "guarded": FLOAT(ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
@@ -97,6 +98,7 @@ call_guards: Any = _caller("guards", 5, False)
 call_switch: Any = _caller("switch", 5, False)
 call_value: Any = _caller("steady", 2, True)
 call_holding: Any = _caller("holding", 4, True)
+call_growth: Any = _caller("growth", 3, True)
 call_profile: Any = _caller("profile", 3, False)
 call_sample: Any = _caller("sample", 9, True)
 call_guarded: Any = _caller("guarded", 9, True)

@@ -85,6 +85,7 @@ class LawPointers(NamedTuple):
     steady: int
     sliding: int
     holding: int
+    growth: int
 
 
 LAW = np.dtype([(name, np.int64) for name in LawPointers._fields])
@@ -128,7 +129,7 @@ def compiled_step(law: Law) -> int:
 
 def entries_of(law: Law) -> dict[str, Callable[..., Any]]:
     """The functions of a law that kernels may call."""
-    names = ("step", "rate", "guards", "switch", "steady", "holding")
+    names = ("step", "rate", "guards", "switch", "steady", "holding", "growth")
     entries: dict[str, Callable[..., Any]] = {
         name: function for name in names if (function := getattr(law, name)) is not None
     }

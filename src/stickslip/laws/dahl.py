@@ -14,7 +14,7 @@ from typing import Annotated, Any, NamedTuple
 from stickslip.laws._direction import direction_ends, direction_of
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
-from stickslip.spec import Law, Mode, Par
+from stickslip.spec import Bristle, Law, Mode, Par
 
 
 class Params(NamedTuple):
@@ -121,6 +121,19 @@ def stored(z: Any, p: Any) -> float:
     return 0.5 * z.force * z.force / p.sigma0
 
 
+def growth(y: float, limit: float, p: Any) -> float:
+    """dy/dx of the deflection F/sigma0 (rad) in the direction of motion, with F_C/sigma0 = `limit`; thesis eq. 2.7."""
+    r = 1.0 - y / limit
+    return math.copysign(abs(r) ** p.delta_d, r)
+
+
+def modes(p: Any) -> Bristle | None:
+    """The law as it stands; a brittle contact, which reaches its level with a kink, has no such form."""
+    if p.delta_d < 1.0:
+        return None
+    return Bristle(p.sigma0, 0.0, p.sigma2, p.fc, 0.0, constant_curve=True, own_growth=True)
+
+
 LAW = Law(
     "dahl",
     Params,
@@ -135,6 +148,8 @@ LAW = Law(
     guards=guards,
     switch=switch,
     steady=steady,
+    modes=modes,
+    growth=growth,
     stored=stored,
     choices=(VISCOUS,),
     passive="always",

@@ -16,7 +16,7 @@ from stickslip.laws._viscous import linear as viscous
 from stickslip.laws.sliding_curve import CURVE, extremes
 from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
-from stickslip.spec import Law, Par
+from stickslip.spec import Bristle, Law, Par
 
 SUBSTEP = 0.05
 """Length of a substep between z_ba and z_ss over the length on which the bristle's rate changes."""
@@ -171,6 +171,19 @@ def is_passive(p: Any) -> bool:
     return p.sigma2 >= p.sigma1 * (high - low) / low
 
 
+def modes(p: Any) -> Bristle:
+    """The law as it stands, with F = sigma0 z."""
+    return Bristle(
+        p.sigma0,
+        p.sigma1,
+        p.sigma2,
+        sliding(0.0, p),
+        sliding_scale(p),
+        own_growth=True,
+        elastic=p.sigma0 * p.z_ba,
+    )
+
+
 def check(p: Any) -> str:
     """The bristle breaks away before it slides, at every velocity."""
     low, _ = extremes(sliding, p, sliding_scale(p))
@@ -199,6 +212,8 @@ LAW = Law(
     State=State,
     rate=rate,
     steady=steady,
+    modes=modes,
+    growth=growth,
     check=check,
     choices=(CURVE, VISCOUS),
     passive="sigma2 >= sigma1 (fs - fc) / fc",

@@ -82,7 +82,14 @@ class Side:
     def of(model: Model | None) -> Side:
         """Lay out a model; None gives an empty side."""
         if model is None:
-            return Side(None, LawPointers(*[0] * 7), np.zeros(1), np.zeros(0), np.zeros(0, np.bool_), 0.0)
+            return Side(
+                None,
+                LawPointers(*[0] * len(LawPointers._fields)),
+                np.zeros(1),
+                np.zeros(0),
+                np.zeros(0, np.bool_),
+                0.0,
+            )
         law, p = model.law, model.parameters
         scale = law.velocity_scale(p) if law.velocity_scale else 0.0
         return Side(

@@ -7,7 +7,7 @@ controller enter through a corrector.
 Nothing is stepped over: break-aways and reversals are located on the exact flow. Tolerance is the error in
 position per step, rad.
 
-A law is taken as `Elements` or as a `Bristle` (LuGre, Dahl). `exact.flow` the flow, `exact.state` what is remembered,
+A law is taken as `Elements` or as a `Bristle` (LuGre). `exact.flow` the flow, `exact.state` what is remembered,
 `exact.forces` torques, `exact.step` one step, `exact.segment` the motion inside it, `exact.events` what ends a mode and
 where, `exact.transition` what changes there, and rest, `exact.output` rows, `exact.kernel` the loop; `exact.metering`,
 `exact.window`, `exact.scan` and `exact.ringing` hand the motion to the meter. `_forcing` feedforward.
@@ -116,6 +116,8 @@ def _complaint(side: Side) -> str:
             return f"law {name!r} has rigid elements with a finite attraction"
         if math.isfinite(e.slope) and not crosses_once(side, e):
             return f"law {name!r} has a steep slope that meets the sliding curve more than once, or never"
+    elif e.own_growth:
+        return f"law {name!r} gives way by a `growth` of its own"
     if not e.constant_curve and not side.pointers.sliding:
         return f"law {name!r} has no sliding curve"
     if not e.constant_curve and e.velocity_scale <= 0.0:

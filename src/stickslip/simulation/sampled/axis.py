@@ -123,18 +123,19 @@ def axis_of(case: Case) -> Laid:
     a["near"] = NEAR * a["local"] * z["spring"]
     a["glide"] = glide_of(a)
     if z["spring"] > 0.0:
-        a["flow"] = flow(linear(a["inertia"], a["viscous"], z["spring"]), a["sample_time"])
+        a["flow"] = flow(linear(a["inertia"], a["damped"], z["spring"]), a["sample_time"])
     return Laid(axis, state, springs)
 
 
 def contact_on(a: Any, z: Any, side: Side, e: Elements | Bristle) -> Any:
     """Write the constants of a contact into those of an axis, and how it starts; returns its springs."""
     known = levels_of(side, e)
-    a["literal"], a["viscous"], a["breakaway"] = int(is_literal(side)), e.viscous, e.breakaway
+    a["literal"], a["breakaway"] = int(is_literal(side)), e.breakaway
+    a["viscous"] = a["damped"] = e.viscous
     a["parameters"] = side.parameters.ctypes.data
     a["curve"], a["scale"] = (0, 1.0) if e.constant_curve else (side.pointers.sliding, e.velocity_scale)
     a["lowest"], a["floor"] = lowest(side, e), known.floors
-    springs = fill_bristle(a, e) if isinstance(e, Bristle) else fill_elements(a, side, e)
+    springs = fill_bristle(a, side, e) if isinstance(e, Bristle) else fill_elements(a, side, e)
     a["springs"], a["count"] = springs.ctypes.data, springs.size
     a["far"], a["level"] = known.far, known.level
     z["mode"] = starting_mode(a, z, springs)
@@ -142,14 +143,19 @@ def contact_on(a: Any, z: Any, side: Side, e: Elements | Bristle) -> Any:
     return springs
 
 
-def fill_bristle(a: Any, e: Bristle) -> Any:
-    """Write a bristle's constants; it has no elements."""
+def fill_bristle(a: Any, side: Side, e: Bristle) -> Any:
+    """Write a bristle's constants; one that only bends at first is a spring until then."""
     a["kind"], a["bristle"], a["lag"] = BENDS, e.stiffness, e.damping / e.stiffness
+    a["growth"] = side.pointers.growth if e.own_growth else 0
     a["settled"] = SETTLED * a["local"] * e.stiffness
     if a["metered"]:
         # The meter reads the motion between the ends of a step from a quintic, which must hold its ringing.
         a["longest"] = min(a["longest"], math.sqrt(a["inertia"] / e.stiffness))
-    return np.zeros(0, SPRING)
+    if e.elastic == 0.0:
+        return np.zeros(0, SPRING)
+    a["elastic"] = a["lowest"] = e.elastic
+    a["damped"] = e.viscous + e.damping
+    return np.array([(e.stiffness, 1.0, 0.0, 0.0)], dtype=SPRING)
 
 
 def fill_elements(a: Any, side: Side, e: Elements) -> Any:
@@ -167,7 +173,7 @@ def fill_elements(a: Any, side: Side, e: Elements) -> Any:
 
 def starting_mode(a: Any, z: Any, springs: Any) -> int:
     """What the axis does at the start."""
-    if a["kind"] == BENDS:
+    if a["kind"] == BENDS and a["elastic"] == 0.0:
         return SLIPS
     if springs.size:
         return STUCK

@@ -44,7 +44,7 @@ from stickslip.simulation.sampled.axis import axis_of, general_axis, not_located
 from stickslip.simulation.sampled.general import Contact, act_on, contact_of, hold, plant_of, step_on
 from stickslip.simulation.sampled.modes import creep, friction, rest, sign
 from stickslip.simulation.sampled.output import PROGRESS, Output, measure, put_out, with_room, write
-from stickslip.simulation.sampled.rates import BENDS, HOLDS, RESTS, SLIPS, STEPS, STUCK
+from stickslip.simulation.sampled.rates import HOLDS, RESTS, SLIPS, STEPS, STUCK, never_sticks
 from stickslip.simulation.sampled.slip import slip
 from stickslip.simulation.sampled.stick import stick
 from stickslip.waiting import Reached, watched
@@ -230,7 +230,7 @@ def act(control: Control, axis: Any, z: Any, contact: Contact, plant: Plant, t: 
 def refresh(axis: Any, z: Any) -> None:
     """The acceleration after a jump of the torque or a change of what slips; a bristle at rest takes its direction."""
     z.acceleration = (z.torque - friction(axis, z)) / axis.inertia
-    if axis.kind == BENDS and z.velocity == 0.0:
+    if never_sticks(axis) and z.velocity == 0.0:
         z.direction = sign(z.acceleration)
 
 

@@ -15,7 +15,9 @@ from stickslip.simulation.sampled.rates import (
     SLIPS,
     STEPS,
     STUCK,
+    bends_by,
     curve_at,
+    never_sticks,
     spring_of,
 )
 from stickslip.simulation.sampled.stretch import Stretch
@@ -37,6 +39,8 @@ def sign(x: float) -> float:
 @kernel(exact=False, inline=True)
 def floor_below(axis: Any, v: float) -> float:
     """A bound below s on all velocities up to v, N·m."""
+    if axis.elastic > 0.0:
+        return axis.elastic
     if axis.curve == 0:
         return axis.breakaway
     top = axis.scale * 2.0 ** (4 - LEVELS)
@@ -45,6 +49,12 @@ def floor_below(axis: Any, v: float) -> float:
             return axis.floor[i]
         top *= 2.0
     return axis.lowest
+
+
+@kernel(exact=False, inline=True)
+def breaks_at(axis: Any, v: float) -> float:
+    """The load over its share at which an element that sticks gives way, N·m."""
+    return axis.elastic if axis.elastic > 0.0 else curve_at(axis, v)
 
 
 @kernel(exact=False, inline=True)
@@ -73,9 +83,9 @@ def stays_below(axis: Any, most: float, piece: Stretch, way: float) -> bool:
     if piece.a0 * piece.a1 < 0.0:
         bulge = 0.5 * piece.time * max(abs(piece.a0), abs(piece.a1))
         fastest, slowest = fastest + bulge, slowest - bulge
-    if most >= curve_at(axis, way * fastest):
+    if most >= breaks_at(axis, way * fastest):
         return False
-    return most < curve_at(axis, way * max(slowest, 0.0))
+    return most < breaks_at(axis, way * max(slowest, 0.0))
 
 
 @kernel(exact=False)
@@ -102,7 +112,7 @@ def fold(axis: Any, z: Any) -> None:
 @kernel(exact=False)
 def gather(axis: Any, z: Any) -> None:
     """Sum up what sticks and what slips."""
-    if axis.kind == BENDS:
+    if never_sticks(axis):
         return
     z.held = z.spring = z.slipping = z.relaxed = 0.0
     z.share = axis.rigid + axis.steep if z.mode == SLIPS else 0.0
@@ -121,7 +131,7 @@ def gather(axis: Any, z: Any) -> None:
 def break_away(axis: Any, z: Any, direction: float) -> None:
     """Let the elements slip whose load has reached their share of the curve; the heaviest in any case."""
     fold(axis, z)
-    level = curve_at(axis, z.velocity)
+    level = breaks_at(axis, z.velocity)
     enough = min(level * (1.0 - AT_ONCE), heaviest(axis, 0.0, direction))
     for i in range(axis.count):
         spring = spring_of(axis, i)
@@ -139,7 +149,7 @@ def turn(axis: Any, z: Any) -> None:
     """The velocity has fallen to zero (or to where the steep slope begins): what slipped sticks."""
     z.velocity = z.direction * axis.layer
     z.events += 1
-    if axis.kind == BENDS:
+    if never_sticks(axis):
         z.direction = sign(z.torque - z.slipping)
         return
     fold(axis, z)
@@ -197,7 +207,7 @@ def creep(axis: Any, z: Any, left: float) -> float:
     return taken
 
 
-@kernel(exact=False)
+@kernel(exact=False, inline=True)
 def friction(axis: Any, z: Any) -> float:
     """Torque of the contact now, N·m."""
     v = z.velocity
@@ -207,12 +217,13 @@ def friction(axis: Any, z: Any) -> float:
         return z.held
     if z.mode == CREEPS:
         return axis.slope * v
-    force = z.held + z.spring * z.moved + axis.viscous * v
+    force = z.held + z.spring * z.moved
     if z.mode == STUCK:
-        return force
+        return force + axis.damped * v
+    force += axis.viscous * v
     level = curve_at(axis, v)
     if axis.kind == FOLLOWS:
         return force + z.share * z.direction * level
     if axis.kind == BENDS:
-        return force + z.slipping + axis.lag * axis.bristle * v * (1.0 - z.direction * z.slipping / level)
+        return force + z.slipping + axis.lag * bends_by(axis, v, z.slipping, level, z.direction)
     return force + z.slipping

@@ -89,7 +89,7 @@ def moved_after(axis: Any, was: Any, z: Any, h: float, t: float) -> tuple[float,
     start = was.position + was.moved
     v0, a0 = was.velocity, was.acceleration
     if was.mode == STUCK:
-        lin = linear(axis.inertia, axis.viscous, was.spring)
+        lin = linear(axis.inertia, axis.damped, was.spring)
         off = was.moved - z.goal
         e, v = free_motion(flow(lin, t), off, v0)
         return start + (e - off), v, -lin.square * e - 2.0 * lin.decay * v

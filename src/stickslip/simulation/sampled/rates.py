@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.jit import call_value, kernel, pointer, pointer_at, record_at, spliced
+from stickslip.jit import call_growth, call_value, kernel, pointer, pointer_at, record_at, spliced
 
 RELAXES, FOLLOWS, BENDS = range(3)
 """What a slipping force does: relax towards the curve (GMS), lie on it (Coulomb, Maxwell-slip), bend as a bristle."""
@@ -24,7 +24,8 @@ LEVELS = 24
 AXIS = np.dtype(
     [
         *((name, np.float64) for name in (
-            "inertia", "viscous", "attraction", "bristle", "lag", "breakaway", "scale", "lowest", "rigid", "steep",
+            "inertia", "viscous", "attraction", "bristle", "lag", "elastic", "damped",
+            "breakaway", "scale", "lowest", "rigid", "steep",
             "slope", "layer", "far", "level", "settled", "sample_time", "local", "near", "longest", "position_limit",
             "velocity_limit",
         )),
@@ -32,12 +33,15 @@ AXIS = np.dtype(
         ("glide", np.float64, (3, 4)),
         ("floor", np.float64, (LEVELS,)),
         *((name, np.int64) for name in ("kind", "literal", "metered")),
-        # Addresses: of the sliding curve (0: none) and the law's parameters, and of the springs, with their number.
-        *((name, np.int64) for name in ("curve", "parameters", "springs", "count")),
+        # Addresses: of the sliding curve (0: none), of a bristle's own growth (0: none), of the law's parameters and of
+        # the springs, with their number.
+        *((name, np.int64) for name in ("curve", "growth", "parameters", "springs", "count")),
     ]
 )  # fmt: skip
-"""Constants of an axis: SI units; `stickslip.simulation.sampled.axis` fills them in. ``flow`` leads a stuck axis over
-a sample, ``glide`` one on which everything slips faster than ``far``, where the curve is level."""
+"""Constants of an axis: SI units; `stickslip.simulation.sampled.axis` fills them in. A bristle that only bends up to
+``elastic`` N·m sticks until then as a spring does. ``damped`` is the damping while everything sticks, ``viscous`` that
+while something slips, N·m·s/rad. ``flow`` leads a stuck axis over a sample, ``glide`` one on which everything slips
+faster than ``far``, where the curve is level."""
 STATE = np.dtype(
     [
         *((name, np.float64) for name in (
@@ -76,6 +80,7 @@ class Slip(NamedTuple):
     lag: float
     breakaway: float
     curve: int
+    growth: int
     parameters: int
     of_velocity: float
     of_force: float
@@ -125,8 +130,14 @@ def slip_of(axis: Any, z: Any) -> Slip:
     return Slip(
         axis.kind, 1.0 / axis.inertia, z.torque - z.held - z.spring * z.moved, z.spring, axis.viscous,
         z.share * z.direction, axis.attraction, z.direction, axis.bristle, axis.lag, axis.breakaway, axis.curve,
-        axis.parameters, of_velocity, of_force,
+        axis.growth, axis.parameters, of_velocity, of_force,
     )  # fmt: skip
+
+
+@kernel(exact=False, inline=True)
+def never_sticks(axis: Any) -> bool:
+    """Whether the contact gives way from the first on, as LuGre's bristle does."""
+    return axis.kind == BENDS and axis.elastic == 0.0
 
 
 @kernel(exact=False, inline=True)
@@ -135,6 +146,20 @@ def curve_at(axis: Any, v: float) -> float:
     if axis.curve == 0:
         return axis.breakaway
     return call_value(axis.curve, v, pointer_at(axis.parameters))
+
+
+@kernel(exact=False)
+def grows_by(growth: int, parameters: int, stiffness: float, v: float, load: float, level: float) -> float:
+    """The same by the law's own growth, apart: text that seldom runs costs the rates time where it is inlined."""
+    return stiffness * v * call_growth(growth, load / stiffness, level / stiffness, pointer_at(parameters))
+
+
+@kernel(exact=False, inline=True)
+def bends_by(axis: Any, v: float, s: float, level: float, way: float) -> float:
+    """Rate of a bristle's force, N·m/s, by an axis, or by what `Slip` has of it."""
+    if axis.growth == 0:
+        return axis.bristle * v * (1.0 - way * s / level)
+    return grows_by(axis.growth, axis.parameters, axis.bristle, v, way * s, level)
 
 
 @kernel(exact=False, inline=True)
@@ -150,7 +175,7 @@ def rates(m: Slip, d: float, v: float, s: float) -> tuple[float, float, float]:
     elif m.kind == FOLLOWS:
         force = m.pull * level
     else:
-        ds = m.bristle * v * (1.0 - m.direction * s / level)
+        ds = bends_by(m, v, s, level, m.direction)
         force = s + m.lag * ds
     return m.mobility * (m.free - m.spring * d - force - m.viscous * v), ds, decay
 

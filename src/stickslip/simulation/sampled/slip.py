@@ -20,6 +20,7 @@ from stickslip.simulation.sampled.rates import (
     Start,
     Trial,
     curve_at,
+    never_sticks,
     rates,
     slip_of,
     start_of,
@@ -86,7 +87,7 @@ def slip(axis: Any, z: Any, left: float) -> float:
         break_away(axis, z, way)
     elif end.turns:
         turn(axis, z)
-    elif axis.kind == BENDS and way * trial.velocity < edge:
+    elif never_sticks(axis) and way * trial.velocity < edge:
         z.direction = sign(trial.velocity)
     return trial.time
 
@@ -130,7 +131,7 @@ def ended(axis: Any, z: Any, m: Slip, start: Start, trial: Trial, left: float) -
     turns = breaks = False
     gap, braking = way * trial.velocity - edge, -way * whole.a1
     if gap < 0.0:
-        if axis.kind != BENDS or 2.0 * abs(trial.velocity) * trial.time > UNSEEN * axis.local:
+        if not never_sticks(axis) or 2.0 * abs(trial.velocity) * trial.time > UNSEEN * axis.local:
             trial, turns = arrival(axis, m, start, whole, trial), True
     elif 0.0 < gap <= NEARBY * trial.time * braking and gap < braking * (left - trial.time):
         there = at_velocity(m, trial, way * edge, axis.sample_time)

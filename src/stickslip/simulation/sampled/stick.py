@@ -10,8 +10,15 @@ from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
 from stickslip.simulation.exact.flow import Linear, flow, free_motion, linear
-from stickslip.simulation.sampled.modes import break_away, floor_below, heaviest, sign, stays_below
-from stickslip.simulation.sampled.rates import curve_at, spring_of
+from stickslip.simulation.sampled.modes import (
+    break_away,
+    breaks_at,
+    floor_below,
+    heaviest,
+    sign,
+    stays_below,
+)
+from stickslip.simulation.sampled.rates import spring_of
 from stickslip.simulation.sampled.stretch import Stretch
 
 PHASE = 0.5
@@ -59,7 +66,7 @@ def acceleration_at(lin: Linear, m: Moment) -> float:
 @kernel(exact=False)
 def stick(axis: Any, z: Any, left: float) -> float:
     """Move with sticking springs for `left` s or until one breaks away; returns the time taken."""
-    lin = linear(axis.inertia, axis.viscous, z.spring)
+    lin = linear(axis.inertia, axis.damped, z.spring)
     goal = (z.torque - z.held) * lin.compliance
     swing = Swing(lin, goal, z.moved - goal, z.velocity)
     z.goal = goal
@@ -104,7 +111,7 @@ def excess(axis: Any, moved: float, v: float, direction: float) -> float:
         return -1.0
     if load < axis.lowest:
         return load - axis.lowest
-    return load - curve_at(axis, v)
+    return load - breaks_at(axis, v)
 
 
 @kernel(exact=False)
@@ -135,6 +142,9 @@ def first_break(axis: Any, swing: Swing, left: float) -> tuple[float, float]:
             if high > 0.0:
                 return bracketed(axis, swing, low, high, way), way
             way, here = -way, top
+            if excess(axis, swing.goal + here.off, 0.0, way) >= 0.0:
+                # A bristle that has been bent further.
+                return here.time, way
         low, high = meeting(axis, swing, here, ahead, way)
         if high > 0.0:
             return bracketed(axis, swing, low, high, way), way
@@ -153,7 +163,7 @@ def meeting(axis: Any, swing: Swing, begin: Moment, end: Moment, way: float) -> 
     load0 = heaviest(axis, goal + here.off, way)
     while here.time < end.time:
         load1 = heaviest(axis, goal + ahead.off, way)
-        if load1 >= axis.lowest and load1 >= curve_at(axis, ahead.velocity):
+        if load1 >= axis.lowest and load1 >= breaks_at(axis, ahead.velocity):
             return here.time, here.time + d
         piece = Stretch(
             d, ahead.off - here.off, here.velocity, acceleration_at(lin, here), ahead.velocity,
