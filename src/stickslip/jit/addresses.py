@@ -23,6 +23,7 @@ SIGNATURES = {
     "sliding": FLOAT(FLOAT, ARRAY),
     "holding": FLOAT(FLOAT, ARRAY, ARRAY, ARRAY),
     "growth": FLOAT(FLOAT, FLOAT, ARRAY),
+    "mover": FLOAT(*[ARRAY] * 10, FLOAT, FLOAT, FLOAT, FLOAT),
     "profile": types.void(FLOAT, ARRAY, ARRAY),
     "sample": FLOAT(FLOAT, FLOAT, FLOAT, FLOAT, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
     "guarded": FLOAT(ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY, ARRAY),
@@ -99,6 +100,7 @@ call_switch: Any = _caller("switch", 5, False)
 call_value: Any = _caller("steady", 2, True)
 call_holding: Any = _caller("holding", 4, True)
 call_growth: Any = _caller("growth", 3, True)
+call_mover: Any = _caller("mover", 14, True)
 call_profile: Any = _caller("profile", 3, False)
 call_sample: Any = _caller("sample", 9, True)
 call_guarded: Any = _caller("guarded", 9, True)

@@ -156,6 +156,13 @@ def compiled_guarded(name: str, function: Callable[..., Any], layouts: Mapping[s
     return _compile(name, {"guarded": function}, layouts)["guarded"]
 
 
+@functools.cache
+def compiled_mover(function: Callable[..., Any]) -> int:
+    """Compile a machine's way across a sample (`stickslip.simulation.machine.movers`); returns its address."""
+    with decorating:
+        return int(compile_entry("mover")(function).address)
+
+
 def _compile(
     name: str, entries: Mapping[str, Callable[..., Any]], layouts: Mapping[str, Layout]
 ) -> dict[str, int]:

@@ -65,7 +65,7 @@ def torque_after(plant: Plant, v0: float, v: float, h: float, out: int) -> float
     z = plant.contact
     for i in range(plant.machine.states):
         z[out + i] = z[i]
-    return call_step(plant.step, v0, v, h, pointer(z, out), plant.parameters, plant.surroundings)
+    return call_step(plant.machine.step, v0, v, h, pointer(z, out), plant.parameters, plant.surroundings)
 
 
 @kernel()
@@ -190,7 +190,7 @@ def with_rest(plant: Plant, tried: Tried) -> float:
 @kernel(inline=True)
 def held_at_rest(plant: Plant, side: float) -> float:
     """The torque that the contact withstands at rest in a direction, N·m."""
-    held = call_holding(plant.holding, side, plant.contact, plant.parameters, plant.surroundings)
+    held = call_holding(plant.machine.holding, side, plant.contact, plant.parameters, plant.surroundings)
     return plant.now.scale * held
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from stickslip.jit import compiled_law, flat, kernel
 from stickslip.machines.drivetrain import INPUTS, Flow, StateSpace
 from stickslip.machines.machine import Machine
+from stickslip.simulation.machine.movers import mover
 from stickslip.simulation.machine.plant import (
     CHANNELS,
     COLUMNS,
@@ -80,6 +81,7 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE, *, located: 
     write_numbers(n, machine, places, tolerance)
     n["states"], n["stiffness"], n["unresolved"] = states, stiff, unresolved
     n["located"] = train.size > 1
+    n["mover"], n["step"], n["holding"] = mover(bool(n["located"])), pointers.step, pointers.holding
     n["resolving"] = min(resolving, UNRESOLVABLE)
     if unresolved:
         n["coarsest"] = UNRESOLVABLE
@@ -90,7 +92,7 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE, *, located: 
     contact[:states] = state[:states]
     return Laid(
         numbers.view(np.float64), memory.view(np.float64), waves_of(machine), matrix, search,
-        np.zeros(2 * SLOTS), contact, parameters, np.array(Surroundings()), train, pointers.step, pointers.holding,
+        np.zeros(2 * SLOTS), contact, parameters, np.array(Surroundings()), train,
     )  # fmt: skip
 
 

@@ -35,8 +35,9 @@ MACHINE = np.dtype(
             "coarsest", "resolving", "unresolved",
             # In shortest sub-steps.
             "delay", "seed",
-            # Whether the motion is the located flow of its train.
-            "located",
+            # Whether the motion is the located flow of its train; addresses of what moves it over a sample, and of the
+            # law's functions, 0 where it has none.
+            "located", "mover", "step", "holding",
         )),
         *((name, np.float64) for name in (
             "sample_time", "torque_constant", "current_limit", "command_step", "monitor_step", "current_noise",
@@ -100,8 +101,6 @@ class Laid(NamedTuple):
     train : array
         Of its located flow (`stickslip.simulation.train.records`); a single 0 where it takes sub-steps. It knows where
         it and the parameters are (`stickslip.simulation.train.layout.seat`).
-    step, holding : int
-        Addresses of the law's functions; 0 where it has none.
     """
 
     numbers: Any
@@ -114,8 +113,6 @@ class Laid(NamedTuple):
     parameters: Any
     surroundings: Any
     train: Any
-    step: int
-    holding: int
 
     @property
     def machine(self) -> Any:
@@ -141,8 +138,6 @@ class Plant(NamedTuple):
     parameters: Any
     surroundings: Any
     train: Any
-    step: int
-    holding: int
 
 
 @spliced
@@ -151,5 +146,5 @@ def plant_of(laid: Laid) -> Plant:
     return Plant(
         record_at(pointer(laid.numbers, 0), MACHINE), record_at(pointer(laid.memory, 0), NOW), pointer(laid.waves, 0),
         pointer(laid.matrix, 0), pointer(laid.search, 0), pointer(laid.axis, 0), pointer(laid.contact, 0),
-        pointer(laid.parameters, 0), pointer(laid.surroundings, 0), pointer(laid.train, 0), laid.step, laid.holding,
+        pointer(laid.parameters, 0), pointer(laid.surroundings, 0), pointer(laid.train, 0),
     )  # fmt: skip

@@ -14,12 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.jit import kernel, pointer, record_at
+from stickslip.jit import call_mover, kernel, pointer, record_at
 from stickslip.simulation.machine.plant import FINEST, SHOWN, Plant
-from stickslip.simulation.machine.substep import cross, harmonics
-from stickslip.simulation.sampled.modes import friction
-from stickslip.simulation.train.cross import advance
-from stickslip.simulation.train.records import train_of
+from stickslip.simulation.machine.substep import harmonics
 
 OVERSPEED = 33792.0  # 8400h of CiA 402: velocity speed controller
 ITSELF = ("position", "velocity", "friction")
@@ -69,33 +66,16 @@ def sample(plant: Plant, torque: float, measured: Any) -> None:
     on = n.torque_constant if now.tripped == 0 else 0.0
     late, old, new = n.delay, on * (before + noise), on * (demand + noise)
     factor = state_factor(n, tick * n.sample_time + now.paused, now.warmth)
-    power = 0.0
-    if n.located != 0:
-        locate(plant, old, new, late)
-    else:
-        power = cross(plant, old, new, late, factor)
+    power = call_mover(
+        n.mover, pointer(n, 0), pointer(now, 0), plant.waves, plant.matrix, plant.search, x, plant.contact,
+        plant.parameters, plant.surroundings, plant.train, old, new, float(late), factor,
+    )  # fmt: skip
     if abs(x[n.shaft + 1]) > n.max_speed or not math.isfinite(x[n.disk]):
         now.tripped = 1
     warm = n.ambient + n.heating * max(factor * power, 0.0)
     now.warmth = warm + (now.warmth - warm) * n.heat_kept
     now.tick = tick + 1
     measure(plant, new if late < 1 << FINEST else old, factor, measured)
-
-
-@kernel()
-def locate(plant: Plant, before: float, drive: float, late: int) -> None:
-    """Move on by a sample along the located flow: under `before` for `late` of its shortest sub-steps, then `drive`."""
-    now, x = plant.now, plant.axis
-    train = train_of(plant.train)
-    part = math.ldexp(float(late), -FINEST)
-    taken = advance(train, x, before, 0.0, part) if late > 0 else 0
-    if taken >= 0 and part < 1.0:
-        rest = advance(train, x, drive, part, 1.0)
-        taken = taken + rest if rest >= 0 else rest
-    now.taken += taken
-    now.friction = friction(train.axis, train.z)
-    if taken < 0:
-        x[plant.machine.disk] = math.nan
 
 
 @kernel(inline=True)

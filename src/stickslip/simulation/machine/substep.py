@@ -153,7 +153,11 @@ def attempt(plant: Plant, drive: float, factor: float, spring: int, level: int) 
     if n.unresolved == 0:
         middle, speed = disk_after(plant, half + n.disk)
     tried = Tried(block, half, middle, speed, h, spring)
-    return with_rest(plant, tried) if plant.holding != 0 else sliding(plant, tried, now.scale * now.friction)
+    return (
+        with_rest(plant, tried)
+        if plant.machine.holding != 0
+        else sliding(plant, tried, now.scale * now.friction)
+    )
 
 
 @kernel(inline=True)
