@@ -37,7 +37,7 @@ FIRST: tuple[Callable[[View], Iterator[Finding]], ...] = (
 )  # fmt: skip
 """What may be asked of any record; the other checks need enough usable rows."""
 CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
-    *FIRST, timing.scale, units.assumed, units.counted,
+    *FIRST, timing.scale, timing.velocity_late, units.assumed, units.counted,
     units.degrees, units.turns, units.reference_scale, units.velocity_scale, units.too_fast, units.torque_scale,
     spikes.spikes, signals.wrapped, signals.repeated, signals.saturated, signals.supply, signals.quantised,
     physics.sign, physics.skew, physics.gravity, play.backlash, change.changes, change.temperature, excitation.moved,

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor.view import View, row
+from stickslip.identify.doctor.view import Array, Smooth, View, row
 
 GAP = 5.0
 """A gap is this many times the usual distance of samples."""
@@ -21,6 +21,11 @@ UNEVEN, ROUNDED = 0.2, 1e-6
 """A distance is uneven when it differs from the usual one by more than this share, and by more than rounding."""
 JITTER = 0.02
 """Width of the middle 90 % of the distances, over their median."""
+LATE, EXPLAINS = 1.0, 0.5
+"""Rows from which on a velocity is late: one that was differenced from row to row is half a row; and the share of its
+distance from the position's change that its lateness then explains."""
+LOOKS = 6
+"""At the velocity, each shifted by what the one before found."""
 
 
 def ascending(view: View) -> Iterator[Finding]:
@@ -122,6 +127,47 @@ def sampling(view: View) -> Iterator[Finding]:
             "jitter",
             f"jitter: samples are {low * 1e3:.4g} to {high * 1e3:.4g} ms apart (middle 90 %)",
         )
+
+
+def velocity_late(view: View) -> Iterator[Finding]:
+    """A velocity that a filter delays, or that is of an older row than its position."""
+    smooth = view.smooth
+    if smooth is None or not (view.has("position") and view.has("velocity")) or smooth.fast <= 0.0:
+        return
+    given = view.filtered("velocity", smooth.velocity.size)
+    late, left, before = lateness(given, smooth)
+    rows = late / view.period
+    if abs(rows) < LATE or left > EXPLAINS * before:
+        return
+    whose = "behind" if late > 0.0 else "ahead of"
+    why = "a filter of the drive's, or a row of another cycle" if late > 0.0 else "a row of another cycle"
+    yield Finding(
+        "note",
+        "velocity-late",
+        f"velocity is {abs(late) * 1e3:.3g} ms ({abs(rows):.2g} rows) {whose} the change of position: {why}",
+        remedy="an axis is identified by its position; methods that take the velocity (breakaway, cogging, attraction)"
+        " derive it with --map velocity=none",
+    )
+
+
+def lateness(given: Array, smooth: Smooth) -> tuple[float, float, float]:
+    """By how much a velocity is late, s, and the mean squares of what it differs by then, and differed by before.
+
+    Least squares of given = c (v(t) - late dv/dt), about the time that the look before has found.
+    """
+    times = smooth.period * np.arange(given.size)
+    late = left = before = 0.0
+    for look in range(LOOKS):
+        v, a = (np.interp(times - late, times, x) for x in (smooth.velocity, smooth.acceleration))
+        both = np.stack([v, a])
+        fitted: Array = np.linalg.lstsq(both.T, given, rcond=None)[0]
+        size, change = float(fitted[0]), float(fitted[1])
+        left = float(np.mean((given - size * v) ** 2))
+        before = left if look == 0 else before
+        if size == 0.0 or look == LOOKS - 1:
+            break
+        late -= change / size
+    return late, left, before
 
 
 def finer(period: float) -> str:

@@ -1,0 +1,60 @@
+"""A velocity column that is late against its position: told from one that is only differenced."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import butter, lfilter
+
+from stickslip.identify.doctor.timing import velocity_late
+from stickslip.identify.doctor.view import View
+from stickslip.record import Record
+
+RATE = 1000.0
+T = np.arange(8000) / RATE
+STEP = 2.0 * np.pi / 2**17
+
+
+def position(frequency=0.7, late=0.0):
+    """From rest, so that a filter starts without a transient, rad."""
+    w, t = 2.0 * np.pi * np.array([frequency, 3.1]), np.maximum(T - late, 0.0)
+    return 0.5 * (1.0 - np.cos(w[0] * t)) + 0.1 * (1.0 - np.cos(w[1] * t))
+
+
+def told(q, v):
+    units = {"position": "rad", "velocity": "rad/s", "motor_torque": "N·m"}
+    return [
+        f.message
+        for f in velocity_late(View(Record(T, {"position": q, "velocity": v, "motor_torque": v}, units)))
+    ]
+
+
+@pytest.mark.parametrize("kind", ["exact", "backward", "central", "noisy", "another unit"])
+def test_a_velocity_that_is_differenced_draws_no_word(kind):
+    q = np.round(position() / STEP) * STEP
+    v = {
+        "exact": np.gradient(position(), T), "backward": np.diff(q, prepend=q[0]) * RATE, "central": np.gradient(q, T),
+        "noisy": np.gradient(q, T) + np.random.default_rng(1).normal(0.0, 0.05, T.size),
+        "another unit": 57.3 * np.gradient(q, T),
+    }[kind]  # fmt: skip
+    assert told(q, v) == []
+
+
+@given(corner=st.floats(8.0, 80.0), frequency=st.floats(0.3, 1.5), sign=st.sampled_from([1.0, -1.0]))
+@settings(max_examples=15, deadline=None)
+def test_a_filter_is_told_by_its_delay(corner, frequency, sign):
+    q = np.round(position(frequency) / STEP) * STEP
+    v = sign * lfilter(*butter(1, corner, fs=RATE), np.gradient(q, T))
+    (message,) = told(q, v)
+    # At frequencies well below its corner a filter of first order delays by 1/(2 pi corner).
+    said = float(message.split(" ms")[0].split()[-1]) * 1e-3
+    assert said == pytest.approx(1.0 / (2.0 * np.pi * corner), rel=0.15)
+    assert "behind" in message
+
+
+@pytest.mark.parametrize("rows", [-20, -3, 3, 40])
+def test_rows_of_another_cycle_are_counted(rows):
+    (message,) = told(position(), np.gradient(position(late=rows / RATE), T))
+    assert f"({abs(rows):g} rows) {'behind' if rows > 0 else 'ahead of'}" in message
