@@ -160,8 +160,7 @@ def lateness(given: Array, smooth: Smooth) -> tuple[float, float, float]:
     for look in range(LOOKS):
         v, a = (np.interp(times - late, times, x) for x in (smooth.velocity, smooth.acceleration))
         both = np.stack([v, a])
-        fitted: Array = np.linalg.lstsq(both.T, given, rcond=None)[0]
-        size, change = float(fitted[0]), float(fitted[1])
+        size, change = (float(x) for x in np.linalg.lstsq(both.T, given, rcond=None)[0])
         left = float(np.mean((given - size * v) ** 2))
         before = left if look == 0 else before
         if size == 0.0 or look == LOOKS - 1:
