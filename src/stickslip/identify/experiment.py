@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -172,6 +173,30 @@ class Experiment:
     def _cut(self, rows: slice) -> Experiment:
         arrays = ("time", "position", "drive", "reference", "supply", "used")
         return replace(self, **{n: None if (a := getattr(self, n)) is None else a[rows] for n in arrays})
+
+
+def insist_on_motion(experiments: Sequence[Experiment]) -> None:
+    """Refuse records that say nothing of an axis.
+
+    Raises
+    ------
+    InputError
+        If there is none, nothing moves in any of them, or their drive's signal is 0 throughout.
+    """
+    if not experiments:
+        raise InputError("no record; give at least one")
+    if not any(np.ptp(t.position) > 0.0 for t in experiments):
+        place = experiments[0].position[0]
+        raise InputError(
+            f"the position is {place:g} throughout: the axis never moved; record a motion, or say which column it is "
+            "(--map position=COLUMN:UNIT)"
+        )
+    drives = [t.drive for t in experiments if t.drive is not None]
+    if drives and not any(np.any(drive != 0.0) for drive in drives):
+        raise InputError(
+            "the drive's signal is 0 throughout; check that it was logged, or say which column it is "
+            "(--map torque=COLUMN:UNIT)"
+        )
 
 
 def evened(time: Array) -> Array:

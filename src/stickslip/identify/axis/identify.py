@@ -32,7 +32,7 @@ from stickslip.identify.axis.result import assembled, narrow_note, noted
 from stickslip.identify.axis.search import Asked, Extras, fitted_axis, require_start
 from stickslip.identify.axis.settled import ALIKE
 from stickslip.identify.estimate import Estimate, Identification, silent
-from stickslip.identify.experiment import Experiment
+from stickslip.identify.experiment import Experiment, insist_on_motion
 from stickslip.identify.fit.axis_start import each_way
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
 from stickslip.identify.regression.regression import Regression, regress_axis
@@ -122,6 +122,7 @@ def identify_axis(
     """
     if not laws:
         raise InputError("no law to identify; name at least one")
+    insist_on_motion(experiments)
     refuse_slow(experiments)
     if intervals not in INTERVALS:
         raise UnknownName("source of intervals", intervals, INTERVALS)

@@ -66,7 +66,7 @@ def identify_attraction(loop: Loop, template: Model, *, noise: Noise | float | N
     options: dict[str, Any] = {"frozen": frozen, "noise": known, "offset": False}
     first, along = fit_loop(loop, template, rows, profiles=False, starts=6, reach=3.0, **options)
     lags = 0 if known else correlation_lags(first.optimum.residuals)
-    found, along = fit_loop(loop, template, rows, starts=first.u[None, :], lags=lags, **options)
+    found, along = fit_loop(loop, template, rows, starts=first, lags=lags, **options)
     curve = curve_of(along, found.vector, found.u)
     traces = (Trace("measured", v, loop.torque[rows], "dense"), Trace("GMS", v, curve[rows]))
     best, *_ = found.estimates

@@ -62,7 +62,20 @@ class Loop:
 
     @classmethod
     def of(cls, record: Record, torque: str = "friction_torque", velocity: str = "") -> Loop:
-        """The loop of a record's channels ``position`` and `torque`."""
+        """The loop of a record's channels ``position`` and `torque`.
+
+        Raises
+        ------
+        InputError
+            If one of them never changes.
+        """
+        for channel in ("position", torque):
+            values = record[channel]
+            if values.size and np.all(values == values[0]):
+                raise InputError(
+                    f"{channel} is {values[0]:g} {record.units[channel]} throughout: without motion and torque there "
+                    "is no loop; check that it was logged"
+                )
         unit = (record.units["position"], record.units[torque])
         return cls(
             record.time, record["position"], record[torque], unit, record[velocity] if velocity else None
@@ -101,12 +114,13 @@ class Loop:
 
 def fit_loop(
     loop: Loop, template: Model, rows: Rows, *, frozen: Iterable[str] = (), noise: Noise | None = None,
-    offset: bool = True, starts: int | Array = 6, profiles: bool = True, reach: float = 1.5, lags: int = 0,
+    offset: bool = True, starts: int | Fit = 6, profiles: bool = True, reach: float = 1.5, lags: int = 0,
     tolerance: float = 1e-12, damping: float = 0.0,
 ) -> tuple[Fit, Along]:  # fmt: skip
     """Fit a law's torque along the motion on some rows; what is returned is simulated over all of them.
 
-    With `damping` (N·m·s/rad) a torque in step with the velocity is fitted along, up to that to either side.
+    The search starts at a fit's values, or at so many places. With `damping` (N·m·s/rad) a torque in step with the
+    velocity is fitted along, up to that to either side.
     """
     along = along_until(template.law, loop, loop.time.size)
     # What comes after the last row changes nothing there.
@@ -131,8 +145,10 @@ def fit_loop(
         return curve_of(seen, vector, u)[rows] - target
 
     scale = {"offset": level, "damping": damping} if damping > 0.0 else level
+    # By name: on other rows other parameters may act.
+    begin = starts if isinstance(starts, int) else vector.coordinates(starts.vector.named(starts.u))[None, :]
     found = fit(
-        residuals, vector, noise=noise, size=float(np.max(np.abs(target))), signed_scale=scale, starts=starts,
+        residuals, vector, noise=noise, size=float(np.max(np.abs(target))), signed_scale=scale, starts=begin,
         reach=reach, profiles=profiles, lags=lags, tolerance=tolerance,
     )  # fmt: skip
     return found, along
@@ -201,9 +217,7 @@ def identify_hysteresis(
         raise InputError(f"{rows.size} rows are too few to fit a loop; give at least 10")
     found, _ = fit_loop(straight, template, rows, starts=STARTS, profiles=False, tolerance=ENDS)
     lags = correlation_lags(found.optimum.residuals)
-    found, along = fit_loop(
-        straight, template, rows, starts=found.u[None, :], lags=lags, tolerance=ENDS, profiles=False
-    )
+    found, along = fit_loop(straight, template, rows, starts=found, lags=lags, tolerance=ENDS, profiles=False)
     curve = curve_of(along, found.vector, found.u)
     rest = np.setdiff1d(np.arange(loop.time.size), rows if fitted is None else fitted)
     rest = rest[rest > rows[0]]
@@ -291,9 +305,7 @@ def choose_hysteresis(
         squares: list[Array] = []
         for block in np.array_split(rows, BLOCKS):
             kept = np.setdiff1d(rows, block)
-            part, _ = fit_loop(
-                straight, template, kept, starts=first.u[None, :], profiles=False, tolerance=COMPARED
-            )
+            part, _ = fit_loop(straight, template, kept, starts=first, profiles=False, tolerance=COMPARED)
             squares.append(((curve_of(along, part.vector, part.u) - straight.torque)[block]) ** 2)
         size = float(np.mean(straight.torque[rows] ** 2))
         table[name] = {

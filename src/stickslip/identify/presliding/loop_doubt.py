@@ -93,7 +93,7 @@ def refitted(
     """Values of the same fit to other rows or a changed loop, from where it stood; None where others are free there."""
     assert found.vector.base is not None
     again, _ = fit_loop(
-        loop, found.vector.base, rows, frozen=frozen, starts=found.u[None, :], profiles=False, tolerance=ENDS,
+        loop, found.vector.base, rows, frozen=frozen, starts=found, profiles=False, tolerance=ENDS,
         **options,
     )  # fmt: skip
     if again.vector.names != found.vector.names:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.experiment import Experiment, evenly_spaced
+from stickslip.identify.experiment import Experiment, evenly_spaced, insist_on_motion
 from stickslip.identify.fit.filters import decimated, low_pass, spectrum
 from stickslip.identify.fit.profile import inverse_information, long_run
 from stickslip.machines.servo import ServoAxis
@@ -140,8 +140,7 @@ def inverse_dynamics(
     InputError
         If the records move too little to tell the parameters apart.
     """
-    if not experiments:
-        raise InputError("no record; give at least one")
+    insist_on_motion(experiments)
     refuse_harmonics(experiments, harmonics)
     if cutoff is not None and not cutoff > 0.0:
         raise InputError(f"cutoff = {cutoff:g} Hz must be greater than 0")

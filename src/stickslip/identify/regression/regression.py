@@ -19,8 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.identify.experiment import Experiment
+from stickslip.identify.experiment import Experiment, insist_on_motion
 from stickslip.identify.regression.band_fit import QUANTILE, BandFit, Number
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS, least_squares
 from stickslip.identify.regression.bands import (
@@ -325,8 +324,7 @@ def regress_axis(
     InputError
         If the records slide too little in one direction at a time, or a motor's constant is missing.
     """
-    if not experiments:
-        raise InputError("no record; give at least one")
+    insist_on_motion(experiments)
     signals = [signals_of(t, axis) for t in experiments]
     width = max(narrowest_width(s) for s in signals)
     period = max(s.period for s in signals)

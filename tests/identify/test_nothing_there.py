@@ -1,0 +1,54 @@
+"""Records in which nothing moves, or nothing drives: one sentence each, by every way in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.errors import InputError
+
+T = np.arange(2000) * 1e-3
+MOVES = 0.3 * np.sin(2.0 * np.pi * T)
+DRIVES = 0.3 * np.sign(np.cos(2.0 * np.pi * T))
+NOTHING = np.zeros(T.size)
+WAYS = [{}, {"law": "coulomb"}, {"inverse": True}, {"per_direction": True}, {"pendulum": True}]
+
+
+def accepted(position, torque):
+    """What the doctor holds for errors, which somebody may take for right."""
+    return [f.code for f in ss.doctor(t=T, position=position, torque=torque).errors]
+
+
+@pytest.mark.parametrize("way", WAYS, ids=str)
+def test_an_axis_that_never_moved(way):
+    still = np.full(T.size, 0.77)
+    with pytest.raises(InputError, match=r"0\.77 throughout: the axis never moved"):
+        ss.identify(t=T, position=still, torque=DRIVES, accept=accepted(still, DRIVES), **way)
+
+
+@pytest.mark.parametrize("way", WAYS, ids=str)
+def test_a_torque_that_is_nought(way):
+    with pytest.raises(InputError, match="signal is 0 throughout"):
+        ss.identify(t=T, position=MOVES, torque=NOTHING, accept=accepted(MOVES, NOTHING), **way)
+
+
+@pytest.mark.parametrize(("position", "torque"), [(NOTHING, DRIVES), (MOVES, NOTHING)])
+def test_a_loop_of_one_that_never_changes(position, torque):
+    with pytest.raises(InputError, match="throughout: without motion and torque there is no loop"):
+        ss.identify(
+            t=T, position=position, torque=torque, method="hysteresis", accept=accepted(position, torque)
+        )
+
+
+def test_blocks_on_which_other_parameters_act_are_compared():
+    """A square wave: without the rows of one block, an element of a law does not act any more."""
+    w = 2.0 * np.pi / T[-1] * 3.0
+    position = 3.5e-3 * np.sign(np.sin(w * T))
+    velocity = np.gradient(position, T)
+    torque = 2e-3 * np.gradient(velocity, T) + 5.0 * np.sign(velocity)
+    torque += np.random.default_rng(72).normal(0.0, 0.5, T.size)
+    found = ss.identify(
+        t=T, position=position, torque=torque, method="hysteresis", accept=accepted(position, torque)
+    )
+    assert found.parameters
