@@ -52,3 +52,11 @@ def test_blocks_on_which_other_parameters_act_are_compared():
         t=T, position=position, torque=torque, method="hysteresis", accept=accepted(position, torque)
     )
     assert found.parameters
+
+
+def test_a_response_of_an_axis_that_never_moved():
+    t = np.arange(25000) * 1e-3
+    torque = np.random.default_rng(0).normal(size=t.size)
+    still = np.full(t.size, 0.77)
+    with pytest.raises(InputError, match="the axis never moved"):
+        ss.identify(t=t, position=still, torque=torque, method="inertia", accept=["never-moved"])

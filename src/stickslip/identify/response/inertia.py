@@ -19,7 +19,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
-from stickslip.identify.experiment import Experiment
+from stickslip.identify.experiment import Experiment, insist_on_motion
 from stickslip.identify.fit.filters import cross_spectrum, spectrum
 from stickslip.identify.regression.inverse import uniform
 from stickslip.machines.servo import ServoAxis
@@ -72,7 +72,7 @@ def frequency_response(experiment: Experiment, axis: ServoAxis, *, lowest: float
     Raises
     ------
     InputError
-        If the record has fewer than two such windows, or no torque.
+        If the record has fewer than two such windows, no torque or no motion.
     """
     t, q, u, rate = uniform(experiment)
     length = math.ceil(4.0 * rate / lowest)
@@ -86,6 +86,7 @@ def frequency_response(experiment: Experiment, axis: ServoAxis, *, lowest: float
     torque = gain * supply * u
     if not np.std(torque) > 0.0:
         raise InputError(f"{experiment.name}: the torque never changes; excite the axis")
+    insist_on_motion([experiment])
     # The position wanders; its difference does not, and leaks less. Central, so that it keeps its phase.
     speed = np.gradient(q, 1.0 / rate)
     f, sxx = spectrum(torque, rate, length)
