@@ -232,6 +232,7 @@ def _rotation(t: Array, q: Array, y: Array, velocity: Array) -> Places:
     """Slow rows in motion, averaged over cells of the angle within a stroke."""
     slope = np.gradient(velocity, t + 1e-12 * np.arange(t.size))
     reach = max(1, round(WINDOW / max(float(np.median(np.diff(t))), 1e-9)))
+    reach = min(reach, (t.size - 1) // 2)
     kernel = np.ones(2 * reach + 1) / (2 * reach + 1)
     acceleration = np.convolve(slope, kernel, "same")
     speed = np.abs(velocity)

@@ -69,9 +69,11 @@ def separable_starts(model: Values, target: Array, vector: Vector, count: int) -
     linear = linear_parameters(model, values, single)
     rng = np.random.default_rng(0)
     low, high = np.maximum(vector.lower, first - REACH), np.minimum(vector.upper, first + REACH)
-    floor = [1e-9 * float(np.max(np.abs(target))) if vector.free[i].logarithmic else vector.free[i].par.lower
-             for i in linear]  # fmt: skip
-    bounds = (np.array(floor), np.array([vector.free[i].par.upper for i in linear]))
+    upper = [vector.free[i].par.upper for i in linear]
+    # A level that has gone to nothing has its bound there, too.
+    floor = [min(1e-9 * float(np.max(np.abs(target))), 0.5 * upper[k]) if vector.free[i].logarithmic
+             else vector.free[i].par.lower for k, i in enumerate(linear)]  # fmt: skip
+    bounds = (np.array(floor), np.array(upper))
     out = [first]
     for _ in range(count):
         u = low + rng.random(first.size) * (high - low)

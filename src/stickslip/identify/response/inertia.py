@@ -235,7 +235,8 @@ def resonances_of(response: Response, inertia: float, above: float) -> list[floa
     """
     place = np.flatnonzero(response.frequency > above)
     n, windows = place.size, response.windows
-    if n < 3 or windows < 2:
+    # Of an inertia below 0, which the verdict tells, there is no rigid axis to rise over.
+    if n < 3 or windows < 2 or not inertia > 0.0:
         return []
     f, g = response.frequency[place], response.coherence[place]
     # Without any relation the coherence exceeds c with the chance (1 - c)^(windows - 1).

@@ -1,4 +1,4 @@
-"""Records in which nothing moves, or nothing drives: one sentence each, by every way in."""
+"""Records in which nothing moves or nothing drives, and others that no axis makes: a sentence, or a result."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
+from stickslip.identify.fit.multistart import separable_starts
+from stickslip.identify.fit.parameter_vector import Vector
 
 T = np.arange(2000) * 1e-3
 MOVES = 0.3 * np.sin(2.0 * np.pi * T)
@@ -15,9 +17,9 @@ NOTHING = np.zeros(T.size)
 WAYS = [{}, {"law": "coulomb"}, {"inverse": True}, {"per_direction": True}, {"pendulum": True}]
 
 
-def accepted(position, torque):
+def accepted(position, torque, t=T):
     """What the doctor holds for errors, which somebody may take for right."""
-    return [f.code for f in ss.doctor(t=T, position=position, torque=torque).errors]
+    return [f.code for f in ss.doctor(t=t, position=position, torque=torque).errors]
 
 
 @pytest.mark.parametrize("way", WAYS, ids=str)
@@ -60,3 +62,39 @@ def test_a_response_of_an_axis_that_never_moved():
     still = np.full(t.size, 0.77)
     with pytest.raises(InputError, match="the axis never moved"):
         ss.identify(t=t, position=still, torque=torque, method="inertia", accept=["never-moved"])
+
+
+def test_an_inertia_below_nothing_has_no_resonance():
+    """A torque of the wrong sign, which somebody has accepted."""
+    rng = np.random.default_rng(1)
+    t = np.arange(30000) * 1e-3
+    torque = rng.normal(size=t.size)
+    velocity = np.cumsum(-torque) * 1e-3 / 0.01
+    position = np.cumsum(velocity - np.linspace(velocity[0], velocity[-1], t.size)) * 1e-3
+    found = ss.identify(
+        t=t, position=position, torque=torque, method="inertia", accept=accepted(position, torque, t)
+    )
+    assert found.parameters["inertia"].value < 0.0
+    assert found.parameters["inertia"].verdict != "identified"
+
+
+def test_a_rotation_shorter_than_the_window_of_its_slopes():
+    t = np.arange(40) * 2e-4
+    position, torque = 1e-3 * np.sin(300.0 * t), np.cos(300.0 * t)
+    with pytest.raises(InputError, match="places are left"):
+        ss.identify(
+            t=t, position=position, torque=torque, method="cogging", accept=accepted(position, torque, t)
+        )
+
+
+def test_a_level_that_has_gone_to_nothing_is_started_from():
+    vector = Vector(ss.Model("coulomb", fc=1e-100), limits={"fc": (1e-101, 1e-99)})
+    v = np.linspace(-1.0, 1.0, 40)
+
+    def model(values):
+        named = dict(zip(vector.names, values, strict=True))
+        return named["fc"] * np.sign(v) + named["sigma2"] * v
+
+    starts = separable_starts(model, 3.0 * np.sign(v) + v, vector, 3)
+    assert starts.shape == (4, vector.size)
+    assert np.all(np.isfinite(starts))
