@@ -258,12 +258,15 @@ def curve_picture(
     best = [side * sliding_torque(found.model, side * grid) for side in (1.0, -1.0)]
     same = bool(np.allclose(*best, rtol=1e-6))
     traces: list[Trace] = []
+    banded = False
     for side, curve in zip((1.0, -1.0), best[:1] if same else best, strict=False):
         word = "" if same else f", v {'>' if side > 0.0 else '<'} 0"
-        low, high = np.nanpercentile(
-            side * curve_band(found.model, own, known, side * grid), [2.5, 97.5], axis=0
-        )
-        traces += [Trace(f"95 % band{word}", grid, low, "band", high), Trace(f"best fit{word}", grid, curve)]
+        drawn = side * curve_band(found.model, own, known, side * grid)
+        # Of parameters that the data hardly hold, no law may be left at some speed.
+        if banded := bool(np.all(np.any(np.isfinite(drawn), axis=0))):
+            low, high = np.nanpercentile(drawn, [2.5, 97.5], axis=0)
+            traces.append(Trace(f"95 % band{word}", grid, low, "band", high))
+        traces.append(Trace(f"best fit{word}", grid, curve))
     points = points_of(found, sliding)
     traces += [*points, *marks(speeds or {}, float(grid[0]), float(grid[-1]))]
     unit = getattr(found.details["axis"], "unit", str)
@@ -271,7 +274,7 @@ def curve_picture(
     message = f"Not identified: {unsure}." if unsure else "Every parameter of the law is identified."
     return Picture(
         "sliding-curve", f"Friction at constant velocity: {found.model.law.title or found.model.law.name}",
-        f"{message} The band holds 95 % of the laws that the data allow."
+        f"{message}{' The band holds 95 % of the laws that the data allow.' if banded else ''}"
         f"{' Points: as measured.' if points else ''}", f"velocity ({unit('rad/s')})",
         f"friction torque ({unit('N·m')})",
         tuple(traces), "log",

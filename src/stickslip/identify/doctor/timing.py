@@ -24,6 +24,8 @@ JITTER = 0.02
 LATE, EXPLAINS = 1.0, 0.5
 """Rows from which on a velocity is late: one that was differenced from row to row is half a row; and the share of its
 distance from the position's change that its lateness then explains."""
+LEAST = 1e-100
+"""Of speeds, over which, and under one over which, they are no numbers of an axis."""
 LOOKS = 6
 """At the velocity, each shifted by what the one before found."""
 
@@ -155,12 +157,16 @@ def lateness(given: Array, smooth: Smooth) -> tuple[float, float, float]:
 
     Least squares of given = c (v(t) - late dv/dt), about the time that the look before has found.
     """
+    sizes = [float(np.sqrt(np.mean(x**2))) for x in (smooth.velocity, smooth.acceleration, given)]
+    if not all(LEAST < x < 1.0 / LEAST for x in sizes):
+        return 0.0, 0.0, 0.0
     times = smooth.period * np.arange(given.size)
     late = left = before = 0.0
     for look in range(LOOKS):
         v, a = (np.interp(times - late, times, x) for x in (smooth.velocity, smooth.acceleration))
         both = np.stack([v, a])
-        size, change = (float(x) for x in np.linalg.lstsq(both.T, given, rcond=None)[0])
+        scaled = np.linalg.lstsq(both.T / sizes[:2], given, rcond=None)[0]
+        size, change = (float(x) / each for x, each in zip(scaled, sizes[:2], strict=True))
         left = float(np.mean((given - size * v) ** 2))
         before = left if look == 0 else before
         if size == 0.0 or look == LOOKS - 1:

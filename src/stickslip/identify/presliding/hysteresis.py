@@ -114,13 +114,13 @@ class Loop:
 
 def fit_loop(
     loop: Loop, template: Model, rows: Rows, *, frozen: Iterable[str] = (), noise: Noise | None = None,
-    offset: bool = True, starts: int | Fit = 6, profiles: bool = True, reach: float = 1.5, lags: int = 0,
+    offset: bool = True, starts: int | Array | Fit = 6, profiles: bool = True, reach: float = 1.5, lags: int = 0,
     tolerance: float = 1e-12, damping: float = 0.0,
 ) -> tuple[Fit, Along]:  # fmt: skip
     """Fit a law's torque along the motion on some rows; what is returned is simulated over all of them.
 
-    The search starts at a fit's values, or at so many places. With `damping` (N·m·s/rad) a torque in step with the
-    velocity is fitted along, up to that to either side.
+    The search starts at a fit's values, at coordinates, or at so many places. With `damping` (N·m·s/rad) a torque in
+    step with the velocity is fitted along, up to that to either side.
     """
     along = along_until(template.law, loop, loop.time.size)
     # What comes after the last row changes nothing there.
@@ -146,7 +146,7 @@ def fit_loop(
 
     scale = {"offset": level, "damping": damping} if damping > 0.0 else level
     # By name: on other rows other parameters may act.
-    begin = starts if isinstance(starts, int) else vector.coordinates(starts.vector.named(starts.u))[None, :]
+    begin = vector.coordinates(starts.vector.named(starts.u))[None, :] if isinstance(starts, Fit) else starts
     found = fit(
         residuals, vector, noise=noise, size=float(np.max(np.abs(target))), signed_scale=scale, starts=begin,
         reach=reach, profiles=profiles, lags=lags, tolerance=tolerance,
