@@ -275,7 +275,8 @@ def summed_up(
     misfit = float(np.sqrt(np.mean(residual**2)))
     rows = np.array(list(named.values()))
     joint = rows @ system.covariance(torque, best)[:core, :core] @ rows.T
-    each = np.sqrt(np.diag(joint))
+    # Of a motion that tells two columns hardly apart, rounding leaves a variance below 0: related to nothing then.
+    each = np.sqrt(np.where(np.diag(joint) > 0.0, np.diag(joint), np.inf))
     return BandFit(
         system.records[0].window.corner, numbers, float(falls / total), weight,
         tuple(tried[k] for k in system.levels), harmonics, joint / np.outer(each, each), misfit,
