@@ -98,3 +98,12 @@ def test_a_level_that_has_gone_to_nothing_is_started_from():
     starts = separable_starts(model, 3.0 * np.sign(v) + v, vector, 3)
     assert starts.shape == (4, vector.size)
     assert np.all(np.isfinite(starts))
+
+
+@pytest.mark.parametrize("moves", [slice(0, 70), slice(-70, None), slice(0, 200)])
+def test_a_motion_at_the_ends_alone_is_looked_at(moves):
+    """Where filters settle there is nothing to regress on."""
+    position, torque = np.zeros(1500), np.random.default_rng(3).normal(0.0, 1.0, 1500)
+    position[moves] = np.cumsum(np.random.default_rng(4).normal(0.0, 1.0, position[moves].size))
+    found = ss.doctor(t=np.arange(1500) * 1e-3, position=position, torque=torque)
+    assert "torque-sign" not in {f.code for f in found.findings}

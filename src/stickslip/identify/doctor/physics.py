@@ -20,6 +20,8 @@ from stickslip.identify.fit.shifts import least_between, shifts_looked_at
 
 ROWS = 20_000
 """Rows of a regression: more tell no more."""
+FEWEST = 50
+"""Rows in motion, away from the ends of the record, that a regression needs."""
 QUARTER = 90.0
 """Of a turn, in degrees, that a pendulum must swing over to be told from a spring."""
 BOTH = 0.05
@@ -166,6 +168,8 @@ def _skew_at_reversals(smooth: Smooth) -> float | None:
     Play, wind-up, ringing and a feedforward shift reversals too: it is asked only where sliding does not tell.
     """
     reach = _reach(smooth)
+    if _inside(smooth, reach).size < FEWEST:
+        return None
     shifts, rests = shifts_looked_at(lambda these: _rests(smooth, these, reach), reach, 30)
     best = int(np.argmin(rests))
     least = max(CLEARLY * float(rests[best]), HARM * float(np.var(smooth.torque)))
@@ -245,11 +249,11 @@ def _offset(view: View, smooth: Smooth, plain: Fit) -> Iterator[Finding]:
 
 
 def usable(view: View) -> Smooth | None:
-    """The filtered record, where it has torque and moves."""
+    """The filtered record, where it has torque and moves, away from its ends."""
     smooth = view.smooth
     if smooth is None or not smooth.torque.size or smooth.fast <= 0.0:
         return None
-    enough = np.count_nonzero(smooth.moving) >= 50 and float(np.std(smooth.torque)) > 0.0
+    enough = _inside(smooth).size >= FEWEST and float(np.std(smooth.torque)) > 0.0
     return smooth if enough else None
 
 
@@ -307,10 +311,15 @@ def _sizes(matrix: Array) -> Array:
 
 def _rows(smooth: Smooth, reach: int = 60) -> Any:
     """Rows that move, so many away from the ends, no more than are needed."""
+    rows = _inside(smooth, reach)
+    return rows[:: max(1, rows.size // ROWS)]
+
+
+def _inside(smooth: Smooth, reach: int = 60) -> Any:
+    """All of them."""
     count = smooth.velocity.size
     edge = min(max(reach, 60), count // 8)
-    rows = np.flatnonzero(smooth.moving[edge : count - edge]) + edge
-    return rows[:: max(1, rows.size // ROWS)]
+    return np.flatnonzero(smooth.moving[edge : count - edge]) + edge
 
 
 def _matrix(smooth: Smooth, rows: Any, *, measured: bool) -> Array:
