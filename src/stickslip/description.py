@@ -212,6 +212,13 @@ class Bristle:
     own_growth: bool = False
     elastic: float = 0.0
 
+    def __post_init__(self) -> None:
+        if self.elastic > 0.0 and not self.own_growth:
+            raise LawError(
+                f"a bristle that only bends up to elastic = {self.elastic:g} N·m gives way by a growth of its own; say "
+                "own_growth=True, and give the law's `growth`"
+            )
+
 
 def fields_of(description: type | None) -> tuple[Field, ...]:
     """Read the annotations of a ``Params`` or ``State`` class."""

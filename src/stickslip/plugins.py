@@ -118,7 +118,7 @@ def law_in(path: str, code: bytes) -> Law:
 @functools.cache
 def _tried(law: Law, origin: str) -> Law:
     """A law from outside, with the choices that any law has: read in the scalar subset, and tried for some steps."""
-    functions = ("step", "sampled", "rate", "guards", "switch", "steady", "holding", "stored")
+    functions = ("step", "sampled", "rate", "guards", "switch", "steady", "holding", "growth", "stored")
     lower({n: getattr(law, n) for n in functions if getattr(law, n)}, law_layouts(law))
     if wrong := trial.complaint(law):
         raise LawError(f"{origin}: law {law.name!r}: {wrong}; correct it (`stickslip law FILE.py --check`)")

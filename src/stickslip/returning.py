@@ -9,7 +9,9 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 
-MUST = frozenset({"step", "sampled", "rate", "steady", "holding", "stored", "sliding", "sample", "guarded"})
+MUST = frozenset(
+    {"step", "sampled", "rate", "steady", "holding", "growth", "stored", "sliding", "sample", "guarded"}
+)
 """Functions whose number is the answer; what others write, they write into their arguments."""
 
 

@@ -21,7 +21,7 @@ Argument order, everywhere: velocity, time step, state ``z``, parameters ``p``, 
                                        (Karnopp)
 ``check(p)``                           a sentence that says what is wrong with the parameters, or ""
 ``modes(p)``                           the law as `Elements` that stick as springs and slip along one curve, or as
-                                       a `Bristle` (what the exact integrator runs on), or None
+                                       a `Bristle` (what the located flows run on), or None
 ``growth(y, limit, p)``                dy/dx of a bristle's deflection in the direction of motion, whose steady value
                                        is ``limit``, where it is not 1 - y/limit (see `Bristle`)
 ``stored(z, p)``                       energy that the contact could give back, J, where it is defined: the

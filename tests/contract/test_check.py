@@ -126,6 +126,16 @@ def test_modes_move_an_axis_as_the_rate_does(name, law_of):
     assert modes_against_rate(wrong).passed is False
 
 
+def test_a_growth_of_another_shape_is_told_from_the_steps():
+    law = plugins.law("dahl")
+    ductile = replace(law, example={**law.example, "delta_d": 2.0}, variants={}, name="ductile")
+    assert modes_against_rate(ductile).passed
+    wrong = replace(ductile, growth=lambda y, limit, p: 1.0 - y / limit, variants={}, name="wrong")
+    assert modes_against_rate(wrong).passed is False
+    without = replace(ductile, growth=None, variants={}, name="without")
+    assert "give `growth`" in modes_against_rate(without).text
+
+
 def _stiffer(elements):
     """The elements at another level, or with another spring."""
     if isinstance(elements, Bristle):

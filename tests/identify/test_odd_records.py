@@ -25,14 +25,21 @@ def accepted(position, torque, t=T):
 @pytest.mark.parametrize("way", WAYS, ids=str)
 def test_an_axis_that_never_moved(way):
     still = np.full(T.size, 0.77)
-    with pytest.raises(InputError, match=r"0\.77 throughout: the axis never moved"):
+    with pytest.raises(InputError, match=r"0\.77 throughout, so that the axis never moved"):
         ss.identify(t=T, position=still, torque=DRIVES, accept=accepted(still, DRIVES), **way)
 
 
 @pytest.mark.parametrize("way", WAYS, ids=str)
 def test_a_torque_that_is_nought(way):
-    with pytest.raises(InputError, match="signal is 0 throughout"):
+    with pytest.raises(InputError, match="signal is 0 wherever the axis moves"):
         ss.identify(t=T, position=MOVES, torque=NOTHING, accept=accepted(MOVES, NOTHING), **way)
+
+
+def test_motion_in_one_record_and_torque_in_another():
+    logs = [ss.Record(T, {"position": q, "motor_torque": u}, {"position": "rad", "motor_torque": "N·m"})
+            for q, u in ((MOVES, NOTHING), (NOTHING, DRIVES))]  # fmt: skip
+    with pytest.raises(InputError, match="signal is 0 wherever the axis moves"):
+        ss.identify(*logs, accept=["never-moved", "no-torque"])
 
 
 @pytest.mark.parametrize(("position", "torque"), [(NOTHING, DRIVES), (MOVES, NOTHING)])
@@ -60,7 +67,7 @@ def test_a_response_of_an_axis_that_never_moved():
     t = np.arange(25000) * 1e-3
     torque = np.random.default_rng(0).normal(size=t.size)
     still = np.full(t.size, 0.77)
-    with pytest.raises(InputError, match="the axis never moved"):
+    with pytest.raises(InputError, match=r"record: the position is .* the axis never moved"):
         ss.identify(t=t, position=still, torque=torque, method="inertia", accept=["never-moved"])
 
 

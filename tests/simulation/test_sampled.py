@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,10 +16,11 @@ from scipy.integrate import solve_ivp
 
 import stickslip as ss
 from stickslip import plugins
-from stickslip.errors import Divergence, InputError
+from stickslip.errors import Divergence, InputError, LawError
 from stickslip.simulation.case_arrays import DONE
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.sampled import engine as sampled
+from stickslip.spec import Bristle
 
 J, TIME = 3.8623e-4, 1e-3
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
@@ -308,6 +310,26 @@ def test_metrics_are_those_of_the_general_step(law, monkeypatch):
         assert one.meta["metrics"][name] == pytest.approx(other.meta["metrics"][name], rel=2e-3), name
     for record in (one, other):
         assert abs(record.meta["energy"]["residual"]) < 1e-3 * record.meta["energy"]["motor_work"]
+
+
+@pytest.mark.parametrize("name", ["gms", "elasto_plastic", "dahl"])
+def test_work_is_counted_where_the_contact_hardly_moves(name):
+    """Torque times the way, sample by sample: a contact that rings while it sticks does little work, not more."""
+    slow = ss.Reference("sine", amplitude=0.01, frequency=0.4)
+    loop = ss.Controller(ss.place("PD", J, 20.0, 1.0), sample_time=TIME)
+    record = ss.simulate(ss.RigidAxis(J, LAWS[name]), loop, slow, 2.0)
+    at = record["event"] == 0.0
+    work = np.sum(record["motor_torque"][at][:-1] * np.diff(record["position"][at]))
+    assert record.meta["metrics"]["motor_work_J"] == pytest.approx(work, rel=2e-3)
+
+
+def test_modes_that_speak_of_a_growth_need_it():
+    law = plugins.law("dahl")
+    without = ss.Model(replace(law, growth=None, variants={}, name="without"), sigma0=3.5e3, fc=0.285)
+    record = ss.simulate(ss.RigidAxis(J, without), CONTROLLERS["PD"], FAST, 0.05)
+    assert "gives no `growth`" in record.meta["general_step"]
+    with pytest.raises(LawError, match="own_growth=True"):
+        Bristle(1e4, 0.0, 0.0, 0.3, 0.01, elastic=0.1)
 
 
 def test_a_loop_that_diverges_says_so():

@@ -21,6 +21,7 @@ SUMMARY = "compile everything once after installation"
 STEPS: dict[str, Sequence[str]] = {
     "simulation": ("study", "thesis", "--only", "low,signed,nominal", "--no-report"),
     "a drive's controller": ("simulate", "drive.toml"),
+    "a machine of elements": ("simulate", "machine.toml"),
     "pictures": ("law", "lugre", "--plot"),
     "identification and recommendation": ("demo",),
     "friction by direction": [
@@ -63,6 +64,18 @@ sample_time = 1e-3
 encoder_counts = 65536.0
 """
 """The file of that name: a controller that takes samples has an engine of its own."""
+MACHINE = """[machine]
+machine = "ideal"
+[reference]
+kind = "sine"
+amplitude = 0.01
+frequency = 2.0
+duration = 0.2
+[controller]
+linear = "PD"
+placement = {bandwidth_hz = 20.0, damping = 1.0}
+"""
+"""The same of a machine that moves along a located flow, which the library's others do not."""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -78,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
     failed = 0
     with tempfile.TemporaryDirectory(prefix="stickslip-warm-up-") as folder, inside(folder):
         Path("drive.toml").write_text(DRIVE, encoding="utf-8")
+        Path("machine.toml").write_text(MACHINE, encoding="utf-8")
         for i, (what, words) in enumerate(STEPS.items(), 1):
             print(f"{i}/{len(STEPS)} {what} ...", end=" ", flush=True)
             begin, heard = time.perf_counter(), io.StringIO()

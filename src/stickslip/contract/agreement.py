@@ -1,4 +1,4 @@
-"""Whether a law's functions are one law: step and rate, steady, and the elements that the exact integrator runs on."""
+"""Whether a law's functions are one law: step and rate, steady, and the elements or bristle of its located flow."""
 
 from __future__ import annotations
 
@@ -106,7 +106,10 @@ def steady_is_reached(law: Law) -> Verdict:
 
 
 def modes_against_rate(law: Law) -> Verdict:
-    """A closed loop by the exact integrator, which runs the elements, and by one that runs the law's own functions."""
+    """A closed loop on the elements, by the exact integrator, and by one that runs the law's own functions.
+
+    A bristle with a growth of its own, which only the sampled integrator takes, is compared along a motion.
+    """
     name = "modes"
     form = law.modes(example(law)) if law.modes else None
     if form is None:

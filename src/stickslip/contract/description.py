@@ -12,7 +12,7 @@ from stickslip.errors import LawError, ParameterError
 from stickslip.spec import Configurable, Law, Mode
 from stickslip.subset import law_layouts, lower
 
-FUNCTIONS = ("step", "sampled", "rate", "guards", "switch", "steady", "holding", "stored")
+FUNCTIONS = ("step", "sampled", "rate", "guards", "switch", "steady", "holding", "growth", "stored")
 
 
 def description(law: Law) -> Verdict:

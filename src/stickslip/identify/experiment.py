@@ -181,21 +181,22 @@ def insist_on_motion(experiments: Sequence[Experiment]) -> None:
     Raises
     ------
     InputError
-        If there is none, nothing moves in any of them, or their drive's signal is 0 throughout.
+        If there is none, nothing moves in any of them, or the drive's signal is 0 in those that move.
     """
     if not experiments:
         raise InputError("no record; give at least one")
-    if not any(np.ptp(t.position) > 0.0 for t in experiments):
+    moved = [t for t in experiments if np.ptp(t.position) > 0.0]
+    names = ", ".join(t.name for t in experiments)
+    if not moved:
         place = experiments[0].position[0]
         raise InputError(
-            f"the position is {place:g} throughout: the axis never moved; record a motion, or say which column it is "
-            "(--map position=COLUMN:UNIT)"
+            f"{names}: the position is {place:g} throughout, so that the axis never moved; record a motion, or say "
+            "which column it is (--map position=COLUMN:UNIT)"
         )
-    drives = [t.drive for t in experiments if t.drive is not None]
-    if drives and not any(np.any(drive != 0.0) for drive in drives):
+    if not any(t.drive is None or np.any(t.drive != 0.0) for t in moved):
         raise InputError(
-            "the drive's signal is 0 throughout; check that it was logged, or say which column it is "
-            "(--map torque=COLUMN:UNIT)"
+            f"{names}: the drive's signal is 0 wherever the axis moves; check that it was logged, or say which column "
+            "it is (--map torque=COLUMN:UNIT)"
         )
 
 

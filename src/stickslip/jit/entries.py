@@ -156,11 +156,16 @@ def compiled_guarded(name: str, function: Callable[..., Any], layouts: Mapping[s
     return _compile(name, {"guarded": function}, layouts)["guarded"]
 
 
-@functools.cache
+_movers: dict[Callable[..., Any], Any] = {}
+
+
 def compiled_mover(function: Callable[..., Any]) -> int:
     """Compile a machine's way across a sample (`stickslip.simulation.machine.movers`); returns its address."""
     with decorating:
-        return int(compile_entry("mover")(function).address)
+        # Kept, since what is compiled lives no longer than what holds it.
+        if function not in _movers:
+            _movers[function] = compile_entry("mover")(function)
+        return int(_movers[function].address)
 
 
 def _compile(

@@ -173,14 +173,9 @@ def is_passive(p: Any) -> bool:
 
 def modes(p: Any) -> Bristle:
     """The law as it stands, with F = sigma0 z."""
+    force = p.sigma0 * p.z_ba
     return Bristle(
-        p.sigma0,
-        p.sigma1,
-        p.sigma2,
-        sliding(0.0, p),
-        sliding_scale(p),
-        own_growth=True,
-        elastic=p.sigma0 * p.z_ba,
+        p.sigma0, p.sigma1, p.sigma2, sliding(0.0, p), sliding_scale(p), own_growth=True, elastic=force
     )
 
 

@@ -263,7 +263,8 @@ def curve_picture(
         word = "" if same else f", v {'>' if side > 0.0 else '<'} 0"
         drawn = side * curve_band(found.model, own, known, side * grid)
         # Of parameters that the data hardly hold, no law may be left at some speed.
-        if banded := bool(np.all(np.any(np.isfinite(drawn), axis=0))):
+        if np.all(np.any(np.isfinite(drawn), axis=0)):
+            banded = True
             low, high = np.nanpercentile(drawn, [2.5, 97.5], axis=0)
             traces.append(Trace(f"95 % band{word}", grid, low, "band", high))
         traces.append(Trace(f"best fit{word}", grid, curve))

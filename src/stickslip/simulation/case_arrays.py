@@ -82,14 +82,8 @@ class Side:
     def of(model: Model | None) -> Side:
         """Lay out a model; None gives an empty side."""
         if model is None:
-            return Side(
-                None,
-                LawPointers(*[0] * len(LawPointers._fields)),
-                np.zeros(1),
-                np.zeros(0),
-                np.zeros(0, np.bool_),
-                0.0,
-            )
+            nowhere = LawPointers(*[0] * len(LawPointers._fields))
+            return Side(None, nowhere, np.zeros(1), np.zeros(0), np.zeros(0, np.bool_), 0.0)
         law, p = model.law, model.parameters
         scale = law.velocity_scale(p) if law.velocity_scale else 0.0
         return Side(

@@ -141,14 +141,18 @@ def velocity_late(view: View) -> Iterator[Finding]:
     rows = late / view.period
     if abs(rows) < LATE or left > EXPLAINS * before:
         return
-    whose = "behind" if late > 0.0 else "ahead of"
-    why = "a filter of the drive's, or a row of another cycle" if late > 0.0 else "a row of another cycle"
+    said = "lags" if late > 0.0 else "leads"
+    why = (
+        "the drive filters it, or logs it cycles later"
+        if late > 0.0
+        else "the position is logged cycles later"
+    )
     yield Finding(
         "note",
         "velocity-late",
-        f"velocity is {abs(late) * 1e3:.3g} ms ({abs(rows):.2g} rows) {whose} the change of position: {why}",
-        remedy="an axis is identified by its position; methods that take the velocity (breakaway, cogging, attraction)"
-        " derive it with --map velocity=none",
+        f"velocity {said} the derivative of position by {abs(late) * 1e3:.3g} ms ({abs(rows):.3g} rows): {why}",
+        remedy="an axis is identified by its position; --method breakaway takes the velocity, and derives it with "
+        "--map velocity=none",
     )
 
 

@@ -277,8 +277,10 @@ def summed_up(
     joint = rows @ system.covariance(torque, best)[:core, :core] @ rows.T
     # Of a motion that tells two columns hardly apart, rounding leaves a variance below 0: related to nothing then.
     each = np.sqrt(np.where(np.diag(joint) > 0.0, np.diag(joint), np.inf))
+    correlation = joint / np.outer(each, each)
+    np.fill_diagonal(correlation, 1.0)
     return BandFit(
         system.records[0].window.corner, numbers, float(falls / total), weight,
-        tuple(tried[k] for k in system.levels), harmonics, joint / np.outer(each, each), misfit,
+        tuple(tried[k] for k in system.levels), harmonics, correlation, misfit,
         misfit / max(float(np.sqrt(np.mean(torque**2))), 1e-300), torque.size, int(system.piece[-1]) + 1,
     )  # fmt: skip

@@ -117,7 +117,7 @@ def _complaint(side: Side) -> str:
         if math.isfinite(e.slope) and not crosses_once(side, e):
             return f"law {name!r} has a steep slope that meets the sliding curve more than once, or never"
     elif e.own_growth:
-        return f"law {name!r} gives way by a `growth` of its own"
+        return f"law {name!r} is a bristle of another form than LuGre's"
     if not e.constant_curve and not side.pointers.sliding:
         return f"law {name!r} has no sliding curve"
     if not e.constant_curve and e.velocity_scale <= 0.0:

@@ -153,11 +153,9 @@ def attempt(plant: Plant, drive: float, factor: float, spring: int, level: int) 
     if n.unresolved == 0:
         middle, speed = disk_after(plant, half + n.disk)
     tried = Tried(block, half, middle, speed, h, spring)
-    return (
-        with_rest(plant, tried)
-        if plant.machine.holding != 0
-        else sliding(plant, tried, now.scale * now.friction)
-    )
+    if n.holding != 0:
+        return with_rest(plant, tried)
+    return sliding(plant, tried, now.scale * now.friction)
 
 
 @kernel(inline=True)

@@ -86,6 +86,8 @@ def not_located(side: Side) -> str:
         return f"law {law.name!r} gives no `modes`"
     if not e.constant_curve and (not side.pointers.sliding or e.velocity_scale <= 0.0):
         return f"law {law.name!r} has no sliding curve with a velocity scale"
+    if isinstance(e, Bristle) and e.own_growth and not side.pointers.growth:
+        return f"law {law.name!r} gives no `growth`, which its `modes` speaks of"
     if isinstance(e, Elements):
         rigid = [math.isinf(k) for k in e.stiffness]
         if any(rigid) and not (all(rigid) and math.isinf(e.attraction)):

@@ -16,6 +16,8 @@ from stickslip.simulation.sampled.stretch import Stretch, velocity_in, within
 
 BESIDE = 1e-11
 """s, by which one-sided values of the reference lie inside a stretch."""
+RINGING = 3.0
+"""rad of a stuck axis's oscillation in a window of the meter, whose five nodes then resolve it."""
 
 
 PROGRESS = np.dtype(
@@ -110,7 +112,10 @@ def moved_after(axis: Any, was: Any, z: Any, h: float, t: float) -> tuple[float,
 def measure(control: Any, axis: Any, was: Any, z: Any, t: float, h: float, output: Output) -> None:
     """Hand the stretch that has led from `was` to `z` to the meter."""
     nodes = output.nodes
-    windows = math.ceil(h / MAX_WINDOW * (1.0 - 1e-9))
+    span = MAX_WINDOW
+    if was.mode == STUCK:
+        span = min(span, RINGING * math.sqrt(axis.inertia / was.spring))
+    windows = math.ceil(h / span * (1.0 - 1e-9))
     beside = min(BESIDE, 0.5 * h)
     for window in range(windows):
         for i in range(5):

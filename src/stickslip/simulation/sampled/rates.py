@@ -150,7 +150,10 @@ def curve_at(axis: Any, v: float) -> float:
 
 @kernel(exact=False)
 def grows_by(growth: int, parameters: int, stiffness: float, v: float, load: float, level: float) -> float:
-    """The same by the law's own growth, apart: text that seldom runs costs the rates time where it is inlined."""
+    """Rate of a bristle's force by the law's own growth, N·m/s.
+
+    Apart, since text that seldom runs costs the rates time where it is inlined.
+    """
     return stiffness * v * call_growth(growth, load / stiffness, level / stiffness, pointer_at(parameters))
 
 
