@@ -22,7 +22,7 @@ from typing import Any
 from stickslip import approval, trial
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError, LawError, UnknownName
-from stickslip.spec import Law, ReferenceKind
+from stickslip.spec import COMPILED, Law, ReferenceKind
 from stickslip.subset import law_layouts, lower
 
 
@@ -118,8 +118,7 @@ def law_in(path: str, code: bytes) -> Law:
 @functools.cache
 def _tried(law: Law, origin: str) -> Law:
     """A law from outside, with the choices that any law has: read in the scalar subset, and tried for some steps."""
-    functions = ("step", "sampled", "rate", "guards", "switch", "steady", "holding", "growth", "stored")
-    lower({n: getattr(law, n) for n in functions if getattr(law, n)}, law_layouts(law))
+    lower({n: getattr(law, n) for n in COMPILED if getattr(law, n)}, law_layouts(law))
     if wrong := trial.complaint(law):
         raise LawError(f"{origin}: law {law.name!r}: {wrong}; correct it (`stickslip law FILE.py --check`)")
     return completed(law)

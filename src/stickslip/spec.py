@@ -83,11 +83,10 @@ __all__ = [
 ]
 
 
-FUNCTIONS = (
-    "step", "sampled", "rate", "guards", "switch", "steady", "holding", "check", "modes", "growth", "velocity_scale",
-    "rest_band", "is_passive", "stored",
-)  # fmt: skip
-"""A law's functions, all of which may call the chosen options."""
+COMPILED = ("step", "sampled", "rate", "guards", "switch", "steady", "holding", "growth", "stored")
+"""A law's functions that are written in the scalar subset, but for those that its options replace."""
+FUNCTIONS = (*COMPILED, "check", "modes", "velocity_scale", "rest_band", "is_passive")
+"""All of them; they may call the chosen options."""
 
 
 @dataclass(frozen=True, eq=False)

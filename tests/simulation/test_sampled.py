@@ -12,93 +12,32 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import stickslip as ss
 from stickslip import plugins
 from stickslip.errors import Divergence, InputError, LawError
 from stickslip.simulation.case_arrays import DONE
-from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.sampled import engine as sampled
 from stickslip.spec import Bristle
-
-J, TIME = 3.8623e-4, 1e-3
-CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
-GMS = ss.Model("gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, **CURVE)
-LUGRE = ss.Model("lugre", sigma0=3.5e4, sigma1=0.1, **CURVE)
-LAWS = {
-    "gms": GMS,
-    "gms, literal": GMS.having(slip_rule="literal"),
-    "gms, Table 10": ss.Model(
-        "gms", {"curve": "double_stribeck"}, k=[1e4, 5e3], alpha=[0.5, 0.5], c=24.0, sigma2=0.01,
-        beta0=80.7454, beta1=-80.4742, beta2=-80.5930, beta3=0.7884, beta4=0.7871, v1=0.1755, v2=0.1758,
-    ),
-    "lugre": LUGRE,
-    "maxwell_slip": ss.Model("maxwell_slip", k=[1e4, 7e3, 5e3, 3e3], w=[0.05, 0.08, 0.09, 0.1], sigma2=0.018),
-    "coulomb": ss.Model("coulomb", fc=0.285, sigma2=0.018),
-    "stribeck": ss.Model("stribeck", k=3.5e4, **CURVE),
-    "dahl": ss.Model("dahl", sigma0=3.5e3, fc=0.285, sigma2=0.018),
-    "dahl, ductile": ss.Model("dahl", sigma0=3.5e3, fc=0.285, sigma2=0.018, delta_d=2.0),
-    "elasto_plastic": ss.Model("elasto_plastic", sigma0=3.5e4, sigma1=0.1, z_ba=4e-6, **CURVE),
-}  # fmt: skip
-W = 2.0 * math.pi * 20.0
-LINEAR = {
-    "PD": ss.ControlBlock("pd", kp=J * W**2, kd=2.0 * J * W),
-    "PID": ss.ControlBlock("pid", kp=3.0 * J * W**2, kd=3.0 * J * W, ki=J * W**3),
-}
-HELP = ss.ControlBlock(
-    "friction_feedforward",
-    ss.Model("lugre", sigma0=3.5e4, sigma1=0.0, **CURVE),
-    {"velocity": "held"},
-    gain=0.9,
+from support.sampled_loops import (
+    CONTROLLERS,
+    CURVE,
+    FAST,
+    GMS,
+    HIGH,
+    LAWS,
+    LOW,
+    LUGRE,
+    PD,
+    PID,
+    ROWS,
+    TIME,
+    J,
+    apart,
+    case_of,
+    moved_by,
+    on_grid,
 )
-
-
-def observer(corner):
-    return ss.ControlBlock("disturbance_observer", inertia=J, corner=corner)
-
-
-ROWS = {
-    name: ss.Controller(
-        loop=LINEAR[loop], sample_time=TIME, feedforward=helper, observer=watcher, torque_limit=1.0
-    )
-    for name, (loop, helper, watcher) in {
-        "PD": ("PD", None, None),
-        "PID": ("PID", None, None),
-        "PD + FF LuGre .9": ("PD", HELP, None),
-        "PID + FF LuGre .9": ("PID", HELP, None),
-        "PD + DOB 200": ("PD", None, observer(200.0)),
-        "PD + DOB 400": ("PD", None, observer(400.0)),
-        "PD + DOB 800": ("PD", None, observer(800.0)),
-        "PD + FF LuGre .9 + DOB 400 residual": ("PD", HELP, observer(400.0)),
-    }.items()
-}
-"""Controllers by the names of the rows of the reference."""
-LOW = ss.Reference("sine", amplitude=0.01, frequency=0.4)
-HIGH = ss.Reference("sine", amplitude=0.5, frequency=0.1)
-FAST = ss.Reference("sine", amplitude=0.05, frequency=4.0)
-PD, PID = (ss.place(kind, J, 36.0, 1.0) for kind in ("PD", "PID"))
-CONTROLLERS = {
-    "PD": ss.Controller(PD, None, 1.0, TIME),
-    "PID with an encoder": ss.Controller(PID, None, 1.0, TIME, 1e6),
-    "feedforward": ss.Controller(PD, ss.Feedforward(LUGRE, 0.9), 1.0, TIME),
-    "feedback at its limit": ss.Controller(PD, ss.Feedback(GMS, 0.8), 0.4, TIME),
-    "cascade": ss.Controller(ss.Cascade(60.0, 0.05, 1.0), None, 1.0, TIME),
-    "control laws": ROWS["PD + FF LuGre .9 + DOB 400 residual"],
-}
-
-
-def case_of(law, controller, reference=FAST, duration=0.3, **more):
-    return prepare(ss.RigidAxis(J, law), controller, reference, duration, **{"metered": False, **more})
-
-
-def on_grid(outcome):
-    return outcome.rows[outcome.rows[:, 8] == 0.0]
-
-
-def apart(one, other):
-    return np.abs(on_grid(one)[:, 3] - on_grid(other)[:, 3]).max()
-
 
 # ---- equal to the general step, which knows a law by its ``step`` alone ----------------------------------------------
 
@@ -166,36 +105,6 @@ def test_errors_of_the_loop_are_those_of_other_engines(row, speed):
     assert found == pytest.approx(INDEPENDENT[row, speed], rel=1e-5)
 
 
-def moved_by(torques, contact):
-    """Positions at every sample under held torques, by DOP853 stopped at every reversal.
-
-    ``contact(v, z, side)`` is friction, N·m, and the rate of its state z.
-    """
-    out, velocity, z = [0.0], 0.0, 0.0
-    for u in torques:
-        t, y = 0.0, [out[-1], velocity, z]
-        while t < TIME:
-            side = math.copysign(1.0, y[1] if y[1] != 0.0 else u - contact(0.0, y[2], 1.0)[0])
-
-            def rate(_, y, u=u, side=side):
-                friction, dz = contact(y[1], y[2], side)
-                return [y[1], (u - friction) / J, dz]
-
-            def turned(_, y, side=side):
-                return side * y[1] if abs(y[1]) > 1e-13 else 1e-13
-
-            turned.terminal, turned.direction = True, -1
-            run = solve_ivp(
-                rate, (t, TIME), y, "DOP853", rtol=1e-12, atol=1e-14, events=turned, max_step=1e-4
-            )
-            t, y = run.t[-1], run.y[:, -1]
-            if run.status == 1:
-                y[1] = 0.0
-        _, velocity, z = y
-        out.append(y[0])
-    return np.array(out)
-
-
 def lugre(v, z, side):
     s = 0.285 + 0.05 * math.exp(-((v / 0.01) ** 2))
     dz = v - 3.5e4 * side * v / s * z
@@ -205,34 +114,6 @@ def lugre(v, z, side):
 def dahl(shape, v, z, side):
     r = 1.0 - side * z / 0.285
     return z + 0.018 * v, 3.5e3 * v * math.copysign(abs(r) ** shape, r)
-
-
-def rests_or_slides(torques, law, p):
-    """Positions of an axis on a contact without memory that holds at rest."""
-    out, velocity = [0.0], 0.0
-    for u in torques:
-        t, y = 0.0, [out[-1], velocity]
-        while t < TIME:
-            side = math.copysign(1.0, y[1] if y[1] != 0.0 else u)
-            if y[1] == 0.0 and abs(u) <= law.holding(side, None, p, None):
-                break
-
-            def rate(_, y, u=u, side=side):
-                return [y[1], (u - law.steady(side * max(side * y[1], 1e-12), p)) / J]
-
-            def turned(_, y, side=side):
-                return side * y[1] if abs(y[1]) > 1e-13 else 1e-13
-
-            turned.terminal, turned.direction = True, -1
-            run = solve_ivp(
-                rate, (t, TIME), y, "DOP853", rtol=1e-12, atol=1e-14, events=turned, max_step=1e-4
-            )
-            t, y = run.t[-1], run.y[:, -1]
-            if run.status == 1:
-                y[1] = 0.0
-        velocity = y[1]
-        out.append(y[0])
-    return np.array(out)
 
 
 def test_lugre_is_that_of_a_general_solver_with_events():
@@ -247,6 +128,20 @@ def test_lugre_is_that_of_a_general_solver_with_events():
 def test_dahl_is_that_of_a_general_solver_with_events(name, shape):
     rows = on_grid(sampled.run(case_of(LAWS[name], CONTROLLERS["PD"], duration=0.06, tolerance=1e-11)))
     expected = moved_by(rows[:-1, 5], partial(dahl, shape))
+    assert np.abs(rows[:, 3] - expected).max() < 1e-9
+    assert np.ptp(expected) > 1e-3
+
+
+def test_elasto_plastic_is_that_of_a_general_solver_with_events():
+    model = LAWS["elasto_plastic"]
+    law, p, now, slope = model.law, model.parameters, SimpleNamespace(z=0.0), SimpleNamespace(z=0.0)
+
+    def contact(v, z, side):
+        now.z = z
+        return law.rate(v, now, p, None, slope), slope.z
+
+    rows = on_grid(sampled.run(case_of(model, CONTROLLERS["PD"], duration=0.06, tolerance=1e-11)))
+    expected = moved_by(rows[:-1, 5], contact)
     assert np.abs(rows[:, 3] - expected).max() < 1e-9
     assert np.ptp(expected) > 1e-3
 
@@ -341,81 +236,3 @@ def test_a_loop_that_diverges_says_so():
 def test_it_says_what_it_cannot_run():
     with pytest.raises(InputError, match="acts in continuous time"):
         ss.simulate(ss.RigidAxis(J, GMS), ss.Controller(PD), FAST, 0.05, integrator="sampled")
-
-
-# ---- laws without a located flow: the general step ------------------------------------------------------------------
-
-OTHERS = {
-    name: ss.Model(name, **law.example)
-    for name, law in ((name, plugins.law(name)) for name in plugins.law_names())
-    if law.modes is None
-}
-"""Every registered law that gives no modes."""
-TOLERANCES = (1e-7, 1e-9, 1e-11)
-
-
-@pytest.mark.parametrize("name", OTHERS)
-def test_every_other_law_takes_the_general_step(name):
-    record = ss.simulate(ss.RigidAxis(J, OTHERS[name]), CONTROLLERS["PD"], FAST, 0.05)
-    assert record.meta["integrator"] == "sampled"
-    assert "gives no `modes`" in record.meta["general_step"]
-    energy = record.meta["energy"]
-    assert abs(energy["residual"]) < 1e-3 * energy["motor_work"]
-
-
-@pytest.mark.parametrize("name", OTHERS)
-def test_errors_fall_with_the_tolerance(name):
-    runs = {
-        t: sampled.run(case_of(OTHERS[name], CONTROLLERS["PD"], duration=0.15, tolerance=t))
-        for t in TOLERANCES
-    }
-    assert all(run.code == DONE for run in runs.values())
-    assert np.ptp(on_grid(runs[1e-11])[:, 3]) > 1e-3
-    coarse, fine = (apart(runs[1e-11], runs[t]) for t in TOLERANCES[:2])
-    assert fine < 0.3 * coarse
-    assert fine < 5e-6
-
-
-def test_a_viscous_axis_moves_as_its_equation_says():
-    law = ss.Model("viscous", sigma2=0.018)
-    rows = on_grid(sampled.run(case_of(law, CONTROLLERS["PD"], tolerance=1e-10)))
-    rate, position, v = 0.018 / J, [0.0], 0.0
-    faded = -math.expm1(-rate * TIME)
-    for u in rows[:-1, 5]:
-        position.append(position[-1] + u / 0.018 * TIME + (v - u / 0.018) * faded / rate)
-        v += (u / 0.018 - v) * faded
-    assert np.abs(rows[:, 3] - position).max() < 1e-9
-    assert np.ptp(position) > 1e-3
-
-
-def test_elasto_plastic_is_that_of_a_general_solver_with_events():
-    model = LAWS["elasto_plastic"]
-    law, p, now, slope = model.law, model.parameters, SimpleNamespace(z=0.0), SimpleNamespace(z=0.0)
-
-    def contact(v, z, side):
-        now.z = z
-        return law.rate(v, now, p, None, slope), slope.z
-
-    rows = on_grid(sampled.run(case_of(model, CONTROLLERS["PD"], duration=0.06, tolerance=1e-11)))
-    expected = moved_by(rows[:-1, 5], contact)
-    assert np.abs(rows[:, 3] - expected).max() < 1e-9
-    assert np.ptp(expected) > 1e-3
-
-
-@pytest.mark.parametrize("name", ["static", "stribeck_plain"])
-def test_what_holds_is_that_of_a_general_solver_with_events(name):
-    model = OTHERS[name]
-    rows = on_grid(sampled.run(case_of(model, CONTROLLERS["PD"], duration=0.3, tolerance=1e-11)))
-    expected = rests_or_slides(rows[:-1, 5], model.law, model.parameters)
-    assert np.abs(rows[:, 3] - expected).max() < 1e-7
-    assert np.ptp(expected) > 1e-3
-    assert np.any(rows[20:, 4] == 0.0)
-
-
-@pytest.mark.parametrize("name", ["static", "stribeck_plain", "karnopp"])
-def test_what_holds_does_not_creep(name):
-    step = ss.Reference("step", amplitude=0.01)
-    rows = on_grid(sampled.run(case_of(OTHERS[name], CONTROLLERS["PD"], step, 60.0, output=0.1)))
-    assert np.ptp(rows[300:, 3]) == 0.0
-    assert abs(rows[-1, 5]) > 1e-3
-    assert rows[-1, 6] == rows[-1, 5]

@@ -46,36 +46,28 @@ STEPS: dict[str, Sequence[str]] = {
     "sweeps": ("sweep", "thesis-robustness", "--cases", "1", "--jobs", "1", "--no-report"),
 }
 """What is compiled, and the command that needs it."""
-DRIVE = """[axis]
+LOOP = """[reference]
+kind = "sine"
+amplitude = 0.01
+frequency = 2.0
+duration = 0.2
+[controller]
+linear = "PD"
+placement = {bandwidth_hz = 20.0, damping = 1.0}
+"""
+AXIS = """[axis]
 inertia = 4e-4
 [friction]
 law = "coulomb"
 fc = 0.285
 sigma2 = 0.018
-[reference]
-kind = "sine"
-amplitude = 0.01
-frequency = 2.0
-duration = 0.2
-[controller]
-linear = "PD"
-placement = {bandwidth_hz = 20.0, damping = 1.0}
-sample_time = 1e-3
-encoder_counts = 65536.0
 """
-"""The file of that name: a controller that takes samples has an engine of its own."""
-MACHINE = """[machine]
-machine = "ideal"
-[reference]
-kind = "sine"
-amplitude = 0.01
-frequency = 2.0
-duration = 0.2
-[controller]
-linear = "PD"
-placement = {bandwidth_hz = 20.0, damping = 1.0}
-"""
-"""The same of a machine that moves along a located flow, which the library's others do not."""
+FILES = {
+    "drive.toml": f"{AXIS}{LOOP}sample_time = 1e-3\nencoder_counts = 65536.0\n",
+    "machine.toml": f'[machine]\nmachine = "ideal"\n{LOOP}',
+}
+"""A controller that takes samples has an engine of its own; so has a machine that moves along a located flow, which the
+library's others do not."""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -90,8 +82,8 @@ def run(args: argparse.Namespace) -> int:
     compiling.silence()  # it is what this verb says itself
     failed = 0
     with tempfile.TemporaryDirectory(prefix="stickslip-warm-up-") as folder, inside(folder):
-        Path("drive.toml").write_text(DRIVE, encoding="utf-8")
-        Path("machine.toml").write_text(MACHINE, encoding="utf-8")
+        for name, text in FILES.items():
+            Path(name).write_text(text, encoding="utf-8")
         for i, (what, words) in enumerate(STEPS.items(), 1):
             print(f"{i}/{len(STEPS)} {what} ...", end=" ", flush=True)
             begin, heard = time.perf_counter(), io.StringIO()

@@ -151,23 +151,21 @@ def growth_against_step(law: Law, form: Bristle) -> Verdict:
         limit = form.breakaway if form.constant_curve else abs(law.steady(v, p) - form.viscous * v)
         for _ in range(150):
             torque = law.step(v, v, dx / abs(v), z, p, U)
-            k1 = bending(law, form, force, v, limit)
-            k2 = bending(law, form, force + 0.5 * dx * k1, v, limit)
-            k3 = bending(law, form, force + 0.5 * dx * k2, v, limit)
-            k4 = bending(law, form, force + dx * k3, v, limit)
+            k1 = bending(law, p, form, force, v, limit)
+            k2 = bending(law, p, form, force + 0.5 * dx * k1, v, limit)
+            k3 = bending(law, p, form, force + 0.5 * dx * k2, v, limit)
+            k4 = bending(law, p, form, force + dx * k3, v, limit)
             force += dx / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-            damped = form.damping / form.stiffness * abs(v) * bending(law, form, force, v, limit)
+            damped = form.damping / form.stiffness * abs(v) * bending(law, p, form, force, v, limit)
             worst = max(worst, abs(torque - force - damped - form.viscous * v) / level)
     said = f"its growth bends the bristle as the law's steps do, to {worst:.1g} of the level"
     return held(name, said) if worst <= ENOUGH else failed(name, said)
 
 
-def bending(law: Law, form: Bristle, force: float, v: float, limit: float) -> float:
+def bending(law: Law, p: Any, form: Bristle, force: float, v: float, limit: float) -> float:
     """dF over the distance slid, N·m/rad, of a bristle with a growth of its own."""
     way = math.copysign(1.0, v)
     if form.elastic > 0.0 and way * force < form.elastic:
         return way * form.stiffness
     assert law.growth is not None
-    return (
-        way * form.stiffness * law.growth(way * force / form.stiffness, limit / form.stiffness, example(law))
-    )
+    return way * form.stiffness * law.growth(way * force / form.stiffness, limit / form.stiffness, p)

@@ -9,10 +9,8 @@ from typing import Any
 from stickslip.contract.motions import name_of, variants
 from stickslip.contract.verdict import Verdict, failed, held
 from stickslip.errors import LawError, ParameterError
-from stickslip.spec import Configurable, Law, Mode
+from stickslip.spec import COMPILED, Configurable, Law, Mode
 from stickslip.subset import law_layouts, lower
-
-FUNCTIONS = ("step", "sampled", "rate", "guards", "switch", "steady", "holding", "growth", "stored")
 
 
 def description(law: Law) -> Verdict:
@@ -43,7 +41,7 @@ def subset(law: Law) -> Verdict:
     count = 0
     for variant in variants(law):
         try:
-            lower({n: f for n in FUNCTIONS if (f := getattr(variant, n))}, law_layouts(variant))
+            lower({n: f for n in COMPILED if (f := getattr(variant, n))}, law_layouts(variant))
         except LawError as error:
             return failed("subset", f"{name_of(variant)}: {error}")
         count += 1

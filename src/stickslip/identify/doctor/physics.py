@@ -176,9 +176,8 @@ def _skew_at_reversals(smooth: Smooth) -> float | None:
     if abs(shifts[best]) < MANY or best in (0, shifts.size - 1) or rests[shifts == 0][0] < least:
         return None
     late = float(shifts[best]) * smooth.period
-    return (
-        late if abs(late) <= EARLY or _is_far(smooth, int(shifts[best]), float(rests[best]), reach) else None
-    )
+    far = abs(late) > EARLY
+    return None if far and not _is_far(smooth, int(shifts[best]), float(rests[best]), reach) else late
 
 
 def _is_far(smooth: Smooth, shift: int, rest: float, reach: int) -> bool:
@@ -310,13 +309,13 @@ def _sizes(matrix: Array) -> Array:
 
 
 def _rows(smooth: Smooth, reach: int = 60) -> Any:
-    """Rows that move, so many away from the ends, no more than are needed."""
+    """No more of `_inside` than are needed."""
     rows = _inside(smooth, reach)
     return rows[:: max(1, rows.size // ROWS)]
 
 
 def _inside(smooth: Smooth, reach: int = 60) -> Any:
-    """All of them."""
+    """Rows that move, so many away from the ends."""
     count = smooth.velocity.size
     edge = min(max(reach, 60), count // 8)
     return np.flatnonzero(smooth.moving[edge : count - edge]) + edge

@@ -136,8 +136,7 @@ def velocity_late(view: View) -> Iterator[Finding]:
     smooth = view.smooth
     if smooth is None or not (view.has("position") and view.has("velocity")) or smooth.fast <= 0.0:
         return
-    given = view.filtered("velocity", smooth.velocity.size)
-    late, left, before = lateness(given, smooth)
+    late, left, before = lateness(view.given_velocity, smooth)
     rows = late / view.period
     if abs(rows) < LATE or left > EXPLAINS * before:
         return

@@ -157,8 +157,7 @@ def velocity_scale(view: View) -> Iterator[Finding]:
         return
     if _in_counts(view) and not view.stated("position"):
         return
-    # Of short steps the filter takes half.
-    given = view.filtered("velocity", smooth.velocity.size)
+    given = view.given_velocity
     size = float(np.sqrt(np.mean(given**2) * np.mean(smooth.velocity**2)))
     if size <= 0.0:
         return

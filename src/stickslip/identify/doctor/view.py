@@ -190,6 +190,11 @@ class View:
         every = (out.position, out.velocity, out.acceleration, out.torque)
         return out if all(np.isfinite(values).all() for values in every) else None
 
+    @cached_property
+    def given_velocity(self) -> Array:
+        """The velocity's own column, filtered as `smooth` is; of short steps the filter takes half."""
+        return self.filtered("velocity", self.smooth.velocity.size if self.smooth else 0)
+
     def filtered(self, channel: str, count: int) -> Array:
         """A channel at so many even times, zero-phase filtered, shape (count,)."""
         grid = np.linspace(float(self.time[0]), float(self.time[-1]), count)

@@ -1,7 +1,6 @@
 """The two ways a machine crosses a sample, each compiled where a machine first takes it.
 
-`stickslip.simulation.machine.step` calls them by address. Compiled into it, they would be so for every machine: 14 s
-for the flow, 7 s for sub-steps.
+`stickslip.simulation.machine.step` calls them by address. Compiled into it, every machine would wait for both.
 """
 
 from __future__ import annotations
@@ -9,8 +8,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stickslip.jit import compiled_mover, kernel, record_at
-from stickslip.simulation.machine.plant import FINEST, MACHINE, NOW, Plant
+from stickslip.jit import compiled_mover, kernel
+from stickslip.simulation.machine.plant import FINEST, Plant, plant_at
 from stickslip.simulation.machine.substep import cross
 from stickslip.simulation.sampled.modes import friction
 from stickslip.simulation.train.cross import advance
@@ -30,10 +29,7 @@ def flows(
     surroundings: Any, train: Any, before: float, drive: float, late: float, factor: float,
 ) -> float:  # fmt: skip
     """Along the located flow, whose contact nothing scales or heats."""
-    plant = Plant(
-        record_at(machine, MACHINE), record_at(now, NOW), waves, matrix, search, axis, contact, parameters,
-        surroundings, train,
-    )  # fmt: skip
+    plant = plant_at(machine, now, waves, matrix, search, axis, contact, parameters, surroundings, train)
     locate(plant, before, drive, int(late))
     return 0.0
 
@@ -43,10 +39,7 @@ def steps(
     surroundings: Any, train: Any, before: float, drive: float, late: float, factor: float,
 ) -> float:  # fmt: skip
     """By sub-steps under error control."""
-    plant = Plant(
-        record_at(machine, MACHINE), record_at(now, NOW), waves, matrix, search, axis, contact, parameters,
-        surroundings, train,
-    )  # fmt: skip
+    plant = plant_at(machine, now, waves, matrix, search, axis, contact, parameters, surroundings, train)
     return cross(plant, before, drive, int(late), factor)
 
 

@@ -141,10 +141,22 @@ class Plant(NamedTuple):
 
 
 @spliced
+def plant_at(
+    machine: Any, now: Any, waves: Any, matrix: Any, search: Any, axis: Any, contact: Any, parameters: Any,
+    surroundings: Any, train: Any,
+) -> Plant:  # fmt: skip
+    """What lies at these addresses."""
+    return Plant(
+        record_at(machine, MACHINE), record_at(now, NOW), waves, matrix, search, axis, contact, parameters,
+        surroundings, train,
+    )  # fmt: skip
+
+
+@spliced
 def plant_of(laid: Laid) -> Plant:
     """The addresses of arrays that outlive the call."""
-    return Plant(
-        record_at(pointer(laid.numbers, 0), MACHINE), record_at(pointer(laid.memory, 0), NOW), pointer(laid.waves, 0),
-        pointer(laid.matrix, 0), pointer(laid.search, 0), pointer(laid.axis, 0), pointer(laid.contact, 0),
-        pointer(laid.parameters, 0), pointer(laid.surroundings, 0), pointer(laid.train, 0),
+    return plant_at(
+        pointer(laid.numbers, 0), pointer(laid.memory, 0), pointer(laid.waves, 0), pointer(laid.matrix, 0),
+        pointer(laid.search, 0), pointer(laid.axis, 0), pointer(laid.contact, 0), pointer(laid.parameters, 0),
+        pointer(laid.surroundings, 0), pointer(laid.train, 0),
     )  # fmt: skip
