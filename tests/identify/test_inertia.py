@@ -98,6 +98,13 @@ def test_what_cannot_be_fitted_is_said() -> None:
         inertia([], AXIS)
 
 
+def test_two_windows_to_the_row_are_enough() -> None:
+    free = Model("coulomb", fc=0.0, sigma2=0.018)
+    assert inertia([excited(0.5, free, seconds=20.0)], AXIS)["inertia"].value == pytest.approx(J, rel=0.2)
+    with pytest.raises(InputError, match=r"19\.9 s hold fewer than two windows of 10 s"):
+        inertia([excited(0.5, free, seconds=19.9)], AXIS)
+
+
 def test_a_value_below_zero_and_an_interval_of_many_decades_are_called_what_they_are():
     assert "below 0" in verdict_on(-2.0, -1.0)
     assert verdict_on(-2.0, 1.0) == "the data do not distinguish it from 0"

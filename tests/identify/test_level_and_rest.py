@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from stickslip.identify.axis.agreed import BAND_ALONE, told_apart
@@ -16,7 +17,13 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter
 from stickslip.identify.regression.band_fit import Number
-from stickslip.identify.regression.regression import LEVEL_UNTOLD, Regression, regress_axis, with_form
+from stickslip.identify.regression.regression import (
+    AT_ONE_SPEED,
+    LEVEL_UNTOLD,
+    Regression,
+    regress_axis,
+    with_form,
+)
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Par
 
@@ -62,6 +69,21 @@ def test_a_level_is_believed_where_the_slope_is_told(logs: Any) -> None:
     assert not found.level_doubt
     low, high = found.interval("fc")
     assert low < truth["fc"] < high
+
+
+@pytest.mark.parametrize(("slowest", "told"), [(4.0, False), (0.5, True)])
+def test_a_level_at_one_speed_alone_is_extrapolated(slowest: float, told: bool) -> None:
+    """To and fro between 4 and 5.7 rad/s: another program's log, whose level came out 35 % too low, to 15 %."""
+    time = np.arange(0.0, 15.0, 2e-3)
+    half, swing = 0.5 * (5.7 + slowest), 0.5 * (5.7 - slowest)
+    goal = np.where(time % 1.5 < 0.75, 1.0, -1.0) * (half + swing * np.sin(2.0 * np.pi * 2.7 * time))
+    velocity = np.convolve(np.pad(goal, 10, mode="edge"), np.full(21, 1.0 / 21.0), "valid")
+    waves = 0.002 * np.sin(16.0 * np.cumsum(velocity) * 2e-3)
+    torque = 2e-5 * np.gradient(velocity, 2e-3) + 0.02 * np.sign(velocity) + 1e-4 * velocity + waves
+    log = Experiment("log", time, np.cumsum(velocity) * 2e-3, torque)
+    found = regress_axis([log], AXIS, harmonics=False)
+    assert not found.slope_told
+    assert found.level_doubt.startswith(AT_ONE_SPEED[:40]) is not told
 
 
 def test_a_slope_that_one_band_alone_tells_beside_no_level_is_not_identified(logs: Any) -> None:

@@ -75,6 +75,14 @@ def test_a_share_of_the_rated_torque_of_a_screw_drive(tmp_path):
     assert record["motor_torque"] == pytest.approx(3.0 * TORQUE * 2.0 * math.pi / LEAD)
 
 
+def test_a_lead_in_millimetres_where_metres_are_asked_is_refused():
+    with pytest.raises(
+        InputError, match=r"lead = 40 m a revolution .* \(0\.04 for 40 mm\), on the command line"
+    ):
+        Drive(lead=40.0)
+    assert Drive(lead=0.04).lead == 0.04
+
+
 @pytest.mark.parametrize("lead", ["0", "-3", "nan", "inf"])
 def test_a_lead_that_is_none(tmp_path, capsys, lead):
     path = written(tmp_path / "log.csv", "time [s],position [mm],motor_torque [Nm]", 1e3 * Q, TORQUE)

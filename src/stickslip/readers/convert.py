@@ -35,6 +35,8 @@ MOTION = (
 EFFORT = ("motor_torque", "friction_torque", "sensor_torque", "compensation_torque")
 NUMBERS = ("counts_per_rev", "rated_torque", "rated_current", "torque_constant", "gear_ratio", "lead")
 """What a drive's data sheet says, each a positive number."""
+LONGEST_LEAD = 5.0
+"""m a revolution: more moves no screw, pinion, pulley or drum."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +75,11 @@ class Drive:
             value = getattr(self, name)
             if not math.isnan(value) and not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"{name} = {value:g} must be greater than 0")
+        if self.lead > LONGEST_LEAD:
+            raise InputError(
+                f"lead = {self.lead:g} m a revolution is more than any screw, pinion or pulley moves; it is in m "
+                f"({1e-3 * self.lead:g} for {self.lead:g} mm), on the command line (--lead) in mm"
+            )
         if self.side not in ("motor", "load"):
             raise InputError(f"side = {self.side!r} is not known; choose from motor, load")
 

@@ -33,13 +33,12 @@ from stickslip.identify.regression.bands import (
     together,
 )
 from stickslip.identify.regression.creeping import NOWHERE, Creep
+from stickslip.identify.regression.falls import Falling, fall_of
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows, narrowest_width, signals_of
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-Falling = Mapping[float, tuple[float, Number]]
-"""By exponent of a fall of friction: how probable it is if there is one, and its velocity, rad/s (m/s)."""
 
 SKEW_ROWS, SKEW_TIME = 1.0, 1e-3
 """Rows, or s if longer, by which a torque column usually lies off at most (one standard deviation)."""
@@ -65,6 +64,12 @@ FALLS, SHOWN = 0.95, 4.0
 LEVEL_UNTOLD = (
     "extrapolated: friction may still fall at the highest recorded speeds, and viscous friction is not told apart "
     "from it"
+)
+ONE_SPEED = 0.5
+"""Of the highest speed, from which on the slowest rows lie at the same: level and slope are then one number."""
+AT_ONE_SPEED = (
+    "extrapolated: the slowest certain sliding is at {share:.0%} of the highest speed, where level and slope of "
+    "friction are one number; record slower moves, too"
 )
 STILL_ROUGH = "motor and load do not move as one even in the windows in which they do so best, and "
 UNSURE_THERE, ROUGHLY = "it is unsure to {share:.0%} there; identified means at most {most:.0%}", 0.1
@@ -255,6 +260,8 @@ class Regression:
             return STILL_ROUGH + UNSURE_THERE.format(share=share, most=ROUGHLY)
         if self.slope_told:
             return ""
+        if self.slowest > ONE_SPEED * self.fastest:
+            return AT_ONE_SPEED.format(share=self.slowest / self.fastest)
         excluded = self.falls <= EXCLUDED
         most, most_sloped = (STRAIGHT, STRAIGHT) if excluded else (LEVEL, SLOPED)
         sloped = QUANTILE * self.numbers["sigma2"].std * self.fastest > most_sloped * abs(level.value)
@@ -367,31 +374,3 @@ def with_form(level: Number, slope: Number) -> Number:
 def root_mean_square(x: Array) -> float:
     """Of a series."""
     return float(np.sqrt(np.mean(x * x)))
-
-
-def fall_of(bands: Sequence[BandFit]) -> tuple[float, Falling]:
-    """Probability that friction falls within the recorded speeds in every band, and how if it does."""
-    out: Falling = {}
-    shares = [b.probability[1:] / max(float(b.probability[1:].sum()), 1e-300) for b in bands]
-    for exponent in USUAL_EXPONENTS:
-        chances: list[float] = []
-        places: list[tuple[float, float]] = []
-        for b, share in zip(bands, shares, strict=True):
-            mine = np.array([fall.exponent == exponent for fall in b.tried])
-            weight, place = share[mine], np.log([fall.vs for fall in b.tried if fall.exponent == exponent])
-            chances.append(float(weight.sum()))
-            if weight.sum() > 0.0:
-                weight = weight / weight.sum()
-                middle = float(weight @ place)
-                places.append((middle, float(weight @ (place - middle) ** 2)))
-        out[exponent] = (math.fsum(chances) / len(chances), velocity_of(places))
-    return min(b.falls for b in bands), out
-
-
-def velocity_of(places: Sequence[tuple[float, float]]) -> Number:
-    """One velocity from mean and variance of its logarithm in every band; unknown without any."""
-    if not places:
-        return Number(math.nan, math.inf)
-    middle = math.fsum(m for m, _ in places) / len(places)
-    variance = math.fsum(v + (m - middle) ** 2 for m, v in places) / len(places)
-    return Number(math.exp(middle), math.exp(middle) * math.sqrt(variance))

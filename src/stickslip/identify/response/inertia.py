@@ -76,6 +76,8 @@ def frequency_response(experiment: Experiment, axis: ServoAxis, *, lowest: float
     """
     t, q, u, rate = uniform(experiment)
     length = math.ceil(4.0 * rate / lowest)
+    if 2 * length - 2 <= q.size < 2 * length:  # two windows to the row, of which rounding took one
+        length = q.size // 2
     if q.size < 2 * length:
         raise InputError(
             f"{experiment.name}: {q.size / rate:.3g} s hold fewer than two windows of {length / rate:.3g} s; give a "
