@@ -12,6 +12,7 @@ from stickslip.identify.axis.gravity import hanging, nearest, within_a_turn
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
+from stickslip.identify.regression.regression import regress_axis
 from stickslip.machines.servo import ServoAxis
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
@@ -58,3 +59,24 @@ def test_an_arm_that_hangs_at_half_a_turn():
     sliding = found.details["regression"]
     assert sliding.confirmed("gravity_angle") == sliding.confirmed("gravity")
     assert sliding.confirmed("gravity")
+
+
+@pytest.mark.parametrize("swing", [1.5, 1.6])
+def test_over_half_a_turn_a_weight_is_no_torque_of_other_orders(swing):
+    """Another program's log of a joint: a constant, orders 2, 3, 4 ... of a turn passed for the weight, 14 N·m
+    [0, 755]."""
+    time = np.arange(0.0, 20.0, 2e-3)
+    slow, fast = 2.0 * math.pi * 0.1, 2.0 * math.pi * 1.3
+    position = swing * (1.0 - np.cos(slow * time)) + 0.05 * (1.0 - np.cos(fast * time))
+    velocity = swing * slow * np.sin(slow * time) + 0.05 * fast * np.sin(fast * time)
+    acceleration = np.gradient(velocity, 2e-3)
+    friction = 6.3 * np.sign(velocity) + 7.0 * velocity
+    torque = 0.79 * acceleration + friction + 14.0 * np.sin(position + 0.35)
+    noisy = torque + 0.05 * np.random.default_rng(1).standard_normal(time.size)
+    found = regress_axis(
+        [Experiment("joint", time, position, noisy)], ServoAxis(drive_side="load", gravity="pendulum")
+    )
+    sine, cosine = found.numbers["gravity_sin"], found.numbers["gravity_cos"]
+    assert math.hypot(sine.value, cosine.value) == pytest.approx(14.0, rel=0.02)
+    assert max(sine.std, cosine.std) < 0.5
+    assert found.interval("fc")[0] < 6.3 < found.interval("fc")[1]

@@ -233,9 +233,10 @@ def orders_in(
     """Orders of a torque over the position that show, and the lowest others, which may be there but are small."""
     skew = fit_band(rows, falls, **options).numbers["skew"].value
     candidates = candidate_orders(rows, axis.motion == "rotary", period)
-    candidates = candidates[axis.gravity == "pendulum" :]  # the first is a pendulum's own
+    own = [0.5 / math.pi] if axis.gravity == "pendulum" else []
+    candidates = candidates[len(own) :]  # the first is a pendulum's own
     curve = [k for k, fall in enumerate(falls) if fall.exponent in GAUSSIAN][::CURVE]
-    shown = shown_orders(rows, skew, candidates, curve)
+    shown = shown_orders(rows, skew, candidates, curve, own)
     return {
         "orders": shown, "background": [o for o in candidates[:BACKGROUND] if o not in shown],
         "blurred": not goes_round(rows, axis.motion == "rotary", period),

@@ -64,8 +64,9 @@ def way_of(records: Sequence[SlidingRows]) -> float:
 
 
 def shown_orders(
-    records: Sequence[SlidingRows], skew: float, candidates: Sequence[float], falls: Sequence[int]
-) -> list[float]:
+    records: Sequence[SlidingRows], skew: float, candidates: Sequence[float], falls: Sequence[int],
+    known: Sequence[float] = (),
+) -> list[float]:  # fmt: skip
     """Those of the candidates that the records show, the largest first.
 
     Parameters
@@ -78,11 +79,14 @@ def shown_orders(
     falls : sequence of int
         Columns of `falling` that make up friction's curve: of one form, since more of them explain what is left by
         chance, and an order then stands out of it that is not there.
+    known : sequence of float
+        Cycles a radian (m) that are there in any case: a pendulum's weight, which over half a turn two others make up.
     """
     torque = np.concatenate([r.torque(skew) for r in records])
-    columns = np.column_stack(
-        [stacked(records, "fixed"), stacked(records, "jerk"), stacked(records, "falling")[:, list(falls)]]
-    )
+    columns = np.column_stack([
+        stacked(records, "fixed"), stacked(records, "jerk"), stacked(records, "falling")[:, list(falls)],
+        *(around(records, order) for order in known),
+    ])  # fmt: skip
     size = np.linalg.norm(columns, axis=0)
     columns = columns[:, size > 0.0] / size[size > 0.0]
     left, singular, _ = np.linalg.svd(columns, full_matrices=False)
