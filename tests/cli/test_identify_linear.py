@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
+from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.identified_file import read_identified
-from stickslip.identify.on_a_line import words
+from stickslip.identify.on_a_line import along_a_line, words
+from stickslip.machines.servo import ServoAxis
 
 ANGULAR = re.compile(r"N·m|(?<![a-z])m?rad(?![a-z])|kg·m²")
 
@@ -49,6 +51,20 @@ def test_sliding_says_newtons_everywhere(
     assert not [t for t in letters if ANGULAR.search(t)]
     assert not ANGULAR.search(re.sub(r'base64,[^"]+', "", html))
     assert read_identified(tmp_path / "model.toml").motion == "linear"
+
+
+def test_verdicts_of_the_axis_are_in_newtons() -> None:
+    """ "the torque asks for -158 N·m" stood beside a table in N."""
+    rotary = Estimate(
+        "fc", "N·m", "F_C", 1.0, 0.1, 0.0, 2.0, False, "the torque asks for -158 N·m (-1.36 at most)"
+    )
+    details = {"axis": ServoAxis(drive_side="load", motion="linear")}
+    found = Identification(
+        "axis", None, (rotary,), np.eye(1), {}, ("fc: 0.7429 N·m against 3 N·m·s/rad",), details=details
+    )
+    said = along_a_line(found)
+    assert said.estimates[0].verdict == "the torque asks for -158 N (-1.36 at most)"
+    assert said.notes == ("fc: 0.7429 N against 3 N·s/m",)
 
 
 def test_misfits_in_json_are_named_by_their_unit(

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
+import numpy as np
 import pytest
 
 from stickslip import law
 from stickslip.identify.axis.falling import told
-from stickslip.identify.axis.result import advice
+from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.axis.result import advice, explaining
 from stickslip.identify.estimate import Estimate
+from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter
-from stickslip.identify.regression.regression import APART
+from stickslip.identify.regression.regression import APART, DRIVES, regress_axis
+from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Par
 
 START = Estimate("inertia", "kg·m²", "J", 1.0, math.inf, -math.inf, math.inf, False)
@@ -32,6 +37,29 @@ def test_an_interval_below_zero_identifies_nothing(positive: bool) -> None:
 def test_one_that_reaches_zero_is_not_told_from_it() -> None:
     said = told(START, parameter(positive=True), 0.1, -0.1, 0.3, math.nan)
     assert (said.identified, said.verdict) == (False, "the data do not distinguish it from 0")
+
+
+def test_a_level_that_would_drive_the_axis_takes_all_verdicts_down(logs: Any) -> None:
+    """At one speed, where the loop answers cogging alone, another program's log gave a mass eight times too high,
+    identified, beside friction of -158 N."""
+    log = logs.draw(4, "held", 1000, "p-pi", "production", "clean")
+    axis = ServoAxis(drive_side="load")
+    right = Experiment("log", log.time, log.position, log.torque)
+    friction = log.truth["fc"] * np.sign(np.gradient(log.position, log.time))
+    wrong = Experiment("log", log.time, log.position, log.torque - 3.0 * friction)
+    assert regress_axis([right], axis).doubt == ""
+    assert regress_axis([wrong], axis).doubt == DRIVES
+    found = identify_axis([wrong], axis, ["coulomb"])
+    assert not any(e.identified for e in found.estimates)
+    assert found["inertia"].verdict == DRIVES
+
+
+def test_a_model_that_leaves_more_torque_than_there_is_tells_nothing() -> None:
+    known = Estimate("inertia", "kg·m²", "J", 1.0, 0.01, 0.98, 1.02, True)
+    (bad,) = explaining([known], {"force_relative": 1.43, "inverse_dynamics_relative": 0.143})
+    assert (bad.identified, bad.verdict[:50]) == (False, "the model leaves 143% of the torque over the whole")
+    for misfit in ({"force_relative": 1.43, "inverse_dynamics_relative": 0.9}, {"force_relative": 0.9}, {}):
+        assert explaining([known], misfit) == (known,)
 
 
 def test_what_to_measure_next_does_not_contradict_the_verdict() -> None:

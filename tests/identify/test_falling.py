@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from stickslip.identify.axis.falling import fall_together, number_of
+from stickslip.identify.axis.falling import fall_together, number_of, within_sliding
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.result import at_level
 from stickslip.identify.estimate import Estimate
@@ -63,6 +63,26 @@ def test_a_law_without_the_fall_that_shows_is_taken_with_care(logs: Any) -> None
     assert said.startswith("With care: friction falls by ")
     assert "law 'coulomb' does not have" in said
     assert "fall" not in trusted(named["stribeck"], sliding_of(named["stribeck"]))
+
+
+def test_of_several_laws_one_with_the_fall_that_shows_is_taken(logs: Any) -> None:
+    """Coulomb's was, beside "friction falls by 12.3 N, which law 'coulomb' does not have"."""
+    _, record = record_of(logs)
+    found = identify_axis([record], AXIS, ["coulomb", "stribeck"])
+    assert found.model is not None
+    assert found.model.law.name == "stribeck"
+    assert "fall_missing_Nm" not in found.misfit
+
+
+@pytest.mark.parametrize(("velocity", "told"), [(0.2, False), (0.3, True)])
+def test_a_fall_below_all_certain_sliding_is_not_identified(velocity: float, told: bool) -> None:
+    """GMS behind a reversal looked like a fall at 5.8 rad/s where certain sliding began at 11.8, and was 1.3."""
+    falls = Estimate("vs", "rad/s", "v_S", velocity, 0.01, velocity - 0.02, velocity + 0.02, True)
+    level = Estimate("fc", "N·m", "F_C", velocity, 0.01, velocity - 0.02, velocity + 0.02, True)
+    judged = within_sliding(falls, 0.25)
+    assert judged.identified is told
+    assert told or judged.verdict.startswith("extrapolated: certain sliding begins at 0.25 rad/s")
+    assert within_sliding(level, 0.25) == level
 
 
 def test_what_the_prediction_error_does_not_tell_takes_the_value_of_certain_sliding(seen: Regression) -> None:

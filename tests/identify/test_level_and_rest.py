@@ -172,3 +172,11 @@ def test_a_constant_torque_is_not_identified_where_friction_is_not() -> None:
     assert refused.verdict == HELD_BY_FRICTION
     assert constant_torque_told([offset, level]) == (offset, level)
     assert constant_torque_told([offset]) == (offset,)  # a law without such a level
+
+
+def test_within_which_way_friction_is_built_up_again(logs: Any) -> None:
+    """A few times the way of the bristles, where the record turns slowly; it cannot be told where windows are wide."""
+    found, truth = regressed(logs, 70003, "actual", 1000, "pid", "staircase", "flexible")
+    assert truth["fc"] / truth["sigma0"] < found.rebuilt < 1e-3
+    fast, truth = regressed(logs, 70013, "commanded", 1000, "feedforward", "sine", "clean")
+    assert 1e-3 < truth["fc"] / truth["sigma0"] * 10.0 < fast.rebuilt

@@ -18,20 +18,19 @@ UNITS = re.compile(r"(?<![^\W\d_])([mµk]?)(N·m|kg·m²|rad)(?![^\W\d_])")
 def along_a_line(found: Identification) -> Identification:
     """The same numbers with the units of a linear axis, in words and pictures too; ``rms_Nm`` is then ``rms_N``.
 
-    A result that knows its axis (`Identification.details`, ``axis``) has its words right already.
+    A result that knows its axis (`Identification.details`, ``axis``) has its pictures right already.
     """
-    estimates = tuple(replace(e, unit=LINEAR.unit(e.unit)) for e in found.estimates)
-    misfit = in_newtons(found.misfit)
+    estimates = tuple(replace(e, unit=LINEAR.unit(e.unit), verdict=words(e.verdict)) for e in found.estimates)
+    found = replace(
+        found, estimates=estimates, misfit=in_newtons(found.misfit), notes=tuple(words(n) for n in found.notes),
+        measure_next=tuple(words(n) for n in found.measure_next),
+    )  # fmt: skip
     if isinstance(found.details.get("axis"), ServoAxis):
-        return replace(found, estimates=estimates, misfit=misfit)
+        return found
     details: dict[str, Any] = {**found.details, "axis": LINEAR}
     if "comparison" in details:
         details["comparison"] = {name: in_newtons(cells) for name, cells in details["comparison"].items()}
-    return replace(
-        found, estimates=tuple(replace(e, verdict=words(e.verdict)) for e in estimates), misfit=misfit, details=details,
-        notes=tuple(words(n) for n in found.notes), measure_next=tuple(words(n) for n in found.measure_next),
-        pictures=tuple(picture(p) for p in found.pictures),
-    )  # fmt: skip
+    return replace(found, details=details, pictures=tuple(picture(p) for p in found.pictures))
 
 
 def in_newtons(numbers: Mapping[str, Any]) -> dict[str, Any]:

@@ -45,6 +45,8 @@ LOST_MOTION = (1e-4, 1e-2)
 """rad (a tenth of it in m), displacement over which it then comes."""
 MOST_STATIC = 2.0
 """Static over Coulomb torque at most, where the record does not tell it: contacts of machines have 1 to 2."""
+HIDDEN = (0.1, 0.6)
+"""Of the slowest certain sliding: velocities of a fall of friction of which nothing shows there."""
 MOST_VISCOUS = 9.0
 """Times the viscous friction found, where the record does not tell it."""
 GIVEN = 0.1
@@ -90,8 +92,9 @@ def plants_of(
     told = next((e for e in found.estimates if e.name == "inertia"), None)
     identified = told.value if told else inertia
     known_to = GIVEN if given and told and not told.identified else math.inf
-    rng = np.random.default_rng(seed)
+    rng, unseen = np.random.default_rng(seed), np.random.default_rng([seed, 2])
     misfit = next((found.misfit[k] for k in LEFT if math.isfinite(found.misfit.get(k, math.nan))), 0.0)
+    most = found.misfit.get("friction_rebuilt_within", math.inf)
     drawn = draw_models(
         found.model, found.estimates, found.correlation, count, seed, plausible(found.estimates, seed)
     )
@@ -100,7 +103,7 @@ def plants_of(
         part = named.get("inertia", identified) / identified
         own = inertia * min(max(part, 1.0 / (1.0 + known_to)), 1.0 + known_to)
         yield Plant(
-            own, _with_springs(_falling(model, found), own, found.motion, rng), offset=here["offset"],
+            own, _with_springs(_falling(model, found, unseen), own, found.motion, rng, most), offset=here["offset"],
             waves=(
                 *_hanging(here["gravity"], here["gravity_angle"], start),
                 *(() if told_of(machine) else _unmodelled(misfit * float(rng.uniform()), found.motion, rng)),
@@ -171,9 +174,14 @@ def _unmodelled(rms: float, motion: str, rng: np.random.Generator) -> tuple[tupl
     return tuple(out) if rms > 0.0 else ()
 
 
-def _with_springs(model: Model, inertia: float, motion: str, rng: np.random.Generator) -> Model:
+def _with_springs(
+    model: Model, inertia: float, motion: str, rng: np.random.Generator, most: float = math.inf
+) -> Model:
     """LuGre with the law's own sliding curve, that breaks away after a way that is drawn: where the law has no springs,
-    and else with a chance of `LOST`, for an elastic drivetrain or backlash between the encoder and the friction."""
+    and else with a chance of `LOST`, for an elastic drivetrain or backlash between the encoder and the friction.
+
+    The way is `most`, rad (m), at most: within that the record has seen friction built up again.
+    """
     if model.law.name not in ("coulomb", "stribeck", "lugre"):
         return model
     lost = float(rng.uniform()) < LOST
@@ -181,7 +189,8 @@ def _with_springs(model: Model, inertia: float, motion: str, rng: np.random.Gene
     if springs and not lost:
         return model
     size = 0.1 if motion == "linear" else 1.0
-    way = size * _between(rng, *(LOST_MOTION if lost else BREAKAWAY))
+    low, high = LOST_MOTION if lost else BREAKAWAY
+    way = _between(rng, size * low, max(min(size * high, most), size * low))
     own: Any = model.parameters
     names = [n + side for side in _ways(model) for n in ("fs", "fc", "vs", "delta_s", "sigma2")]
     curve = {n: getattr(own, n) for n in names if hasattr(own, n)}
@@ -202,20 +211,28 @@ def _with_springs(model: Model, inertia: float, motion: str, rng: np.random.Gene
         return model
 
 
-def _falling(model: Model, found: Identified) -> Model:
-    """The law with the fall of friction that the record shows, where it has none itself."""
-    fall = missing_fall(found.misfit)
-    if not (fall > 0.0 and model.law.name == "coulomb"):
+def _falling(model: Model, found: Identified, rng: np.random.Generator) -> Model:
+    """The law with the fall of friction that the record shows, where it has none itself; with one below the slowest
+    certain sliding, which no record excludes, where it shows none."""
+    fall, slowest = missing_fall(found.misfit), found.misfit.get("slowest_sliding", 0.0)
+    if model.law.name != "coulomb":
         return model
+    own: Any = model.parameters
+    if fall > 0.0:
+        return _with_fall(model, fall, found.misfit["fall_missing_velocity"])
+    if not slowest > 0.0:
+        return model
+    rest = (MOST_STATIC - 1.0) * float(rng.uniform()) * float(own.fc)
+    return _with_fall(model, rest, slowest * _between(rng, *HIDDEN))
+
+
+def _with_fall(model: Model, fall: float, vs: float) -> Model:
+    """Coulomb's law with so much more friction at rest, N·m, that falls with a velocity, rad/s."""
     own: Any = model.parameters
     curve: dict[str, Any] = {}
     for way in _ways(model):
         level = float(getattr(own, f"fc{way}"))
-        curve |= {
-            f"fs{way}": level + fall,
-            f"fc{way}": level,
-            f"vs{way}": found.misfit["fall_missing_velocity"],
-        }
+        curve |= {f"fs{way}": level + fall, f"fc{way}": level, f"vs{way}": vs}
         curve[f"sigma2{way}"] = float(getattr(own, f"sigma2{way}"))
     # Of its stiffness nothing is left once springs are drawn.
     return Model("stribeck", _choices(model), k=float(own.fc) / 1e-3, **curve)

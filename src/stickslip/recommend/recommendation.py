@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from statistics import median
 from typing import Any
 
 from stickslip.model import Model
@@ -82,6 +83,11 @@ class Recommendation:
         return 1.0 - ALLOWANCE * max(self.chosen.errors), 1.0 - min(self.chosen.errors) / BETTER
 
     @property
+    def usual_reduction(self) -> float:
+        """The part of the error that is taken away on half of the axes that the setting was not picked on."""
+        return 1.0 - median(self.chosen.errors[1:]) if self.chosen and self.confirmed_on else 0.0
+
+    @property
     def confirmed_on(self) -> int:
         """How many drawn axes the chosen setting was confirmed on."""
         return len(self.chosen.errors) - 1 if self.chosen else 0
@@ -99,6 +105,7 @@ class Recommendation:
             "model": self.model.as_dict() if self.model else None, "gains": self.gains,
             "linear_error_rms": self.linear_error, "margin": self.margin, "unsafe_gain": self.unsafe_gain,
             "reduction": list(self.reduction) if self.chosen else None, "reduction_confidence": self.confidence,
+            "usual_reduction": self.usual_reduction if self.chosen else None,
             "axes": self.axes, "axes_confirmed": self.confirmed_on, "notes": list(self.notes),
             "linear_alone_rings": self.rings, "drive": self.drive.as_dict(),
             "candidates": [c.as_dict() for c in self.candidates],

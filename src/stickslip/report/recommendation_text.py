@@ -104,8 +104,10 @@ def reduction(result: Recommendation) -> str:
     best = percent(1.0 - result.chosen.errors[0], 1.0 - result.chosen.errors[0])
     if result.confirmed_on < 2:
         return f"{best} on the best estimate; no interval"
+    usual = percent(result.usual_reduction, result.usual_reduction)
     return (
-        f"{best} on the best estimate; {100.0 * result.confidence:.0f} % interval {percent(*result.reduction)}, "
+        f"{best} on the best estimate, {usual} on half of the sampled axes; "
+        f"{100.0 * result.confidence:.0f} % interval {percent(*result.reduction)}, "
         f"safe on all {result.confirmed_on} sampled axes (Monte Carlo)"
         + (", but for the linear controller's own oscillation" if result.rings else "")
     )

@@ -16,7 +16,15 @@ import numpy as np
 
 from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
-from stickslip.identify.axis.falling import FALL, SAME, fall_together, told, with_rest, with_timing
+from stickslip.identify.axis.falling import (
+    FALL,
+    SAME,
+    fall_together,
+    told,
+    with_rest,
+    with_timing,
+    within_sliding,
+)
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.axis.settled import ALONE, APART, TWO_METHODS
 from stickslip.identify.estimate import Estimate
@@ -196,7 +204,7 @@ def agreed(
             notes += said
     out = tuple(taken.get(e.name, e) for e in estimates)
     # Reversals show what a contact withstands, where the torque is known to act from row to row.
-    out = out if held else with_rest(out)
+    out = out if held else with_rest([within_sliding(e, found.slowest) for e in out])
     if doubts:
         out = tuple(
             replace(e, identified=False, verdict=doubts) if e.identified and e.name not in sliding else e

@@ -30,6 +30,10 @@ NOT_TOGETHER = (
     "the columns do not belong together (a torque or velocity that comes late), or something else moves it"
 )
 BELOW = f"the torque asks for {{value:.3g}} {{unit}} ({{high:.3g}} at most), which cannot be below 0: {NOT_TOGETHER}"
+BELOW_SLIDING = (
+    "extrapolated: certain sliding begins at {slowest:.3g} {unit}, and below it friction after a reversal looks like a "
+    "fall with velocity; record slow constant speeds"
+)
 AT_REST = "extrapolated to rest: at which velocity friction falls to its level is not told"
 
 
@@ -78,6 +82,14 @@ def widened(e: Estimate, p: Parameter, factor: float) -> Estimate:
     """An estimate whose interval is so many times as wide, in logarithms, and not narrower than `UNLIKE`."""
     below, above = (math.hypot(factor * math.log(end / e.value), UNLIKE) for end in (e.lower, e.upper))
     return told(e, p, e.value, e.value * math.exp(-below), e.value * math.exp(above), math.nan)
+
+
+def within_sliding(e: Estimate, slowest: float) -> Estimate:
+    """A velocity of friction's fall, not identified where it lies below all certain sliding: only reversals show it
+    there, each law in its way (of four logs of another program one held)."""
+    if e.name not in BEGINS or not e.identified or e.value >= slowest:
+        return e
+    return replace(e, identified=False, verdict=BELOW_SLIDING.format(slowest=slowest, unit=e.unit))
 
 
 def with_rest(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:

@@ -145,7 +145,7 @@ def identify_axis(
         evidence = replace(evidence, exponent_open=True)
         asked, more = shown(asked, evidence.sliding, tried)
         notes = [*notes, *more]
-    if automatic:
+    if len(tried) > 1:
         tried = shortlist(tried, evidence.sliding)
     chosen, own = tried[0], asked_of(tried[0], asked, tried)
     if len(tried) > 1:
@@ -262,7 +262,7 @@ def looked_at(
 
 
 def shortlist(laws: Sequence[Law], sliding: Regression | None) -> list[Law]:
-    """The laws worth a comparison where none was named: only those with a fall of friction where one shows clearly.
+    """The laws worth a comparison, of several: only those with a fall of friction where one shows clearly.
 
     Where none shows it may lie below the speeds of certain sliding.
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -48,6 +48,13 @@ HELD_BY_FRICTION = (
     "friction's level is not told, and friction at rest holds any torque up to its own: a constant torque shows where "
     "the axis slides both ways"
 )
+WORSE = 2.0
+"""Times the force error of plain least squares from which on a model that leaves more torque than there is tells
+nothing."""
+EXPLAINS_NOTHING = (
+    "the model leaves {own:.0%} of the torque over the whole record, plain least squares {plain:.0%}: it does not "
+    "describe this axis"
+)
 STRIBECK = ("fs", "vs", "delta_s")
 LOOP_OFF = 0.3
 """Relative error of the simulated loop's drive signal from which on its gains are doubted."""
@@ -71,8 +78,12 @@ def assembled(
     if inverse is not None and inverse.has("fc"):
         misfit["force_relative"] = force_error(inverse, result.model, named)
         misfit["inverse_dynamics_relative"] = inverse.relative_error
+    judged = explaining(judged, misfit)
     if sliding is not None:
         misfit |= left_where_it_slides(sliding, result.model, result.mechanics)
+        misfit["slowest_sliding"] = sliding.slowest
+        if math.isfinite(sliding.rebuilt):
+            misfit["friction_rebuilt_within"] = sliding.rebuilt
     if validation:
         misfit |= {f"held_out_{k}": v for k, v in result.held_out(validation).items()}
         if inverse is not None and inverse.has("fc"):
@@ -94,6 +105,16 @@ def assembled(
             "axis": result.problem.axis, "units": result.problem.units,
         },
     )  # fmt: skip
+
+
+def explaining(estimates: Sequence[Estimate], misfit: Mapping[str, float]) -> tuple[Estimate, ...]:
+    """The estimates, none of them identified where the model leaves more of the torque than there is, and plain least
+    squares less than half as much."""
+    own, plain = misfit.get("force_relative", 0.0), misfit.get("inverse_dynamics_relative", math.inf)
+    if not own > max(1.0, WORSE * plain):
+        return tuple(estimates)
+    why = EXPLAINS_NOTHING.format(own=own, plain=plain)
+    return tuple(replace(e, identified=False, verdict=why) if e.identified else e for e in estimates)
 
 
 def left_where_it_slides(sliding: Regression, model: Model, mechanics: Mechanics) -> dict[str, float]:

@@ -60,7 +60,8 @@ TOO_WIDE = (
 )
 KEPT = (
     "Inertia and friction stay those of certain sliding: within its intervals nothing comes near the force error of "
-    "plain least squares, whose numbers it refutes (what play and reversals do is in them)."
+    "plain least squares, whose numbers leave more of the torque where it slides, torque over the position aside "
+    "(what play and reversals do is in them)."
 )
 BEST_WITHIN = (
     "Of the values {where} their intervals those are given that explain the whole record best, reversals included: "
@@ -68,8 +69,8 @@ BEST_WITHIN = (
 )
 CONTROLLER = (
     "Plain least squares leaves less of the torque, {plain:.3g} % against {own:.3g} %, with {names} below 0, which "
-    "no friction is: such a torque is made from the velocity by a controller, or comes late. Record moves under "
-    "position control, all columns by one clock."
+    "no friction is: its speeds and strokes are too few, or the torque comes late or is made from the velocity by a "
+    "controller. Record moves at several speeds under position control, all columns by one clock."
 )
 SURE = 3.0
 """Standard deviations below 0 from which on a friction of plain least squares is one that cannot be."""

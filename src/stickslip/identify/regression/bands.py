@@ -6,7 +6,6 @@ the motor slides, a train that rings), the narrowest in which they do.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,6 +20,7 @@ from stickslip.identify.regression.band_fit import QUANTILE, BandFit, Number, fi
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.creeping import NOWHERE, Creep, creep_of
 from stickslip.identify.regression.orders import candidate_orders, goes_round, shown_orders
+from stickslip.identify.regression.rebuilding import rebuilding_way
 from stickslip.identify.regression.sliding_rows import FEWEST, Fall, Signals, SlidingRows, sliding_rows
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
@@ -47,9 +47,6 @@ CLEARLY, THROUGHOUT = 3.0, 1.7
 """Misfit that none must then leave in the first band, or in every band of several, in those with it. Of 23 that torque
 over the position and ringing had made, 21 were below both (of the others one shows no inertia, one leaves 3.4 times);
 of 48 delays of 5 rows on production moves all skews hold, and of 24 on staircases (`benchmarks/ordinary_logs.py`)."""
-REBUILT, SHORT, MARGIN = -0.15, 0.6, 2.5
-"""Friction this far below the level, in parts of it, is still being rebuilt after a reversal; the part of the rows that
-may be left out for that; and how much farther they are left out."""
 GAUSSIAN = (2.0,)
 """The exponent of friction's fall in windows that are wider than noise asks, and where what is left is rough: the
 slower form of exponent 1 explains by level and slope what motor and load do apart (680382: Fc 25 % too low)."""
@@ -302,35 +299,6 @@ def rows_of(
     creep = creep_of(rows, skew)
     faster = [r for r in (r.faster(creep.speed) for r in rows) if r.time.size >= FEWEST]
     return (faster, falls, creep) if faster and creep is not NOWHERE else (rows, falls, NOWHERE)
-
-
-def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:
-    """Way after a reversal or stop over which friction is still being built up again, rad (m).
-
-    Pre-sliding, play and wind-up all leave friction below its level there, whatever their law.
-    """
-    fixed, gone = stacked(records, "fixed"), stacked(records, "gone")
-    torque = np.concatenate([r.torque(skew) for r in records])
-    middle = float(np.median(gone))
-    far = gone >= middle
-    values = np.linalg.lstsq(fixed[far], torque[far], rcond=1e-9)[0]
-    level = float(values[2])
-    if level <= 0.0 or middle <= 0.0:
-        return 0.0
-    lacking = (torque - fixed @ values) * fixed[:, 2] / level
-    edges = np.geomspace(max(float(gone.min()), 1e-9 * middle), middle, 25)
-    last = 0.0
-    for low, high in itertools.pairwise(edges.tolist()):
-        inside = (gone >= low) & (gone < high)
-        if np.count_nonzero(inside) >= 3 and np.median(lacking[inside]) < REBUILT:
-            last = high
-    # Both directions must be left.
-    most = [
-        float(np.quantile(gone[fixed[:, 2] * side > 0.0], SHORT))
-        for side in (-1.0, 1.0)
-        if np.any(fixed[:, 2] * side > 0.0)
-    ]
-    return min(MARGIN * last, *most)
 
 
 # ---- what the bands say together ------------------------------------------------------------

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.experiment import Experiment, insist_on_motion
+from stickslip.identify.fit.smooth import Window
 from stickslip.identify.regression.band_fit import QUANTILE, BandFit, Number
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS, least_squares
 from stickslip.identify.regression.bands import (
@@ -34,7 +35,14 @@ from stickslip.identify.regression.bands import (
 )
 from stickslip.identify.regression.creeping import NOWHERE, Creep
 from stickslip.identify.regression.falls import Falling, fall_of
-from stickslip.identify.regression.sliding_rows import Fall, SlidingRows, narrowest_width, signals_of
+from stickslip.identify.regression.rebuilding import rebuilt_within
+from stickslip.identify.regression.sliding_rows import (
+    Fall,
+    SlidingRows,
+    narrowest_width,
+    signals_of,
+    sliding_rows,
+)
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 
@@ -81,6 +89,10 @@ BEYOND_LEVEL = (
     f"{NOT_AS_ONE}: more than twice the level of friction is left "
     "unexplained where it slides; record gentler motion"
 )
+DRIVES = (
+    "the level of friction comes out below 0, so that it would drive the axis: the columns do not belong together, "
+    "or something else moves it (cogging at one speed); record moves at several speeds, all columns by one clock"
+)
 UNMOVED = (
     "the torque shows neither the pendulum's inertia nor its weight, which move it all the same: it is what a "
     "controller makes of the velocity (bang-bang, energy shaping), not what friction needs; record moves under "
@@ -118,6 +130,8 @@ class Regression:
         Times that the windows are wider than noise asks, so that motor and load move as one in them.
     creep : Creep
         Up to which speed friction is missing, so that slower rows are left out.
+    rebuilt : float
+        Way behind a reversal or stop within which friction is there again, rad (m).
     each_way : bool
         Whether friction has a level and a slope of its own in each direction: ``fc_positive`` and so on are numbers
         too, ``fc``, ``sigma2`` and ``fs`` the means of both.
@@ -135,6 +149,7 @@ class Regression:
     widened: float = 1.0
     creep: Creep = NOWHERE
     each_way: bool = False
+    rebuilt: float = math.inf
 
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval of a number."""
@@ -220,6 +235,8 @@ class Regression:
             return APART.format(share=unsure / max(level, 1e-300))
         if self.unexplained_by(self.own) > BEYOND * level:
             return BEYOND_LEVEL
+        if self.interval("fc")[1] < 0.0:
+            return DRIVES
         swings = self.numbers.keys() >= ROTATED and np.ptp(stacked(self.rows, "position")) >= SWUNG
         return UNMOVED if swings and not any(map(self.above_chance, ("inertia", *ROTATED))) else ""
 
@@ -352,9 +369,10 @@ def regress_axis(
     for way in ("", "_positive", "_negative") if each_way else ("",):
         numbers[f"fc{way}"] = with_form(numbers[f"fc{way}"], numbers[f"sigma2{way}"])
     numbers["skew"] = Number(skew, size) if skew is not None else as_told(numbers, size, period)
+    whole = [sliding_rows(s, Window(width, s.period)) for s in signals]
     return Regression(
         numbers, bands, seen.orders, falls, falling, float(np.quantile(speed, 0.01)), float(np.max(speed)), period,
-        seen.rows, seen.widened, seen.creep, each_way,
+        seen.rows, seen.widened, seen.creep, each_way, rebuilt_within(whole, numbers["skew"].value),
     )  # fmt: skip
 
 
