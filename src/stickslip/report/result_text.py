@@ -11,7 +11,7 @@ from stickslip.report.next_steps import BY_A_RIG, Step
 
 JUDGED = (
     "force_relative", "inverse_dynamics_relative", "position_", "drive_relative", "sliding_rms", "fall_missing",
-    "rms_Nm", "rms_N",
+    "rms_Nm", "rms_N", "slowest_sliding", "friction_rebuilt_within",
 )  # fmt: skip
 """Misfits that sentences say, or that say little (the position of an open loop drifts); all are in `as_dict`."""
 

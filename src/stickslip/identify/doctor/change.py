@@ -38,6 +38,9 @@ SHARE = 0.04
 """Of the torque that a change must be: edges of a staircase that the filter blurs pass for an inertia of less."""
 OWN = 0.1
 """Part of the acceleration that is no function of the position, below which no inertia is told (a single sine)."""
+THIRD, OTHER_MOTION = 1.0 / 3.0, 3.0
+"""Of a trend, which is an end of it; times the acceleration, or that over the velocity, at one end that it is at the
+other in another motion."""
 WARMER = 5.0
 """K."""
 UNTOLD, WORSE = 1.0, 4.0
@@ -99,6 +102,8 @@ def changes(view: View) -> Iterator[Finding]:
         cut = _where(parts, torque, blocks, first)
         shape = np.heaviside(np.arange(rows.size) - cut, 1.0)
     sizes = system.changes(torque, parts, shape)
+    if _other_motion(smooth.acceleration[rows], smooth.velocity[rows], shape):
+        return
     # All rows together must say what the blocks say.
     small = {n for n, s in zip(WORTH, sizes, strict=True) if n != "load" and abs(s) < WORTH[n]}
     told, alone = {c.part for c in found} - small, system.own_acceleration() > OWN
@@ -116,6 +121,17 @@ def changes(view: View) -> Iterator[Finding]:
     remedy = f"identify each part alone: --to {at:.6g}, and --from {at:.6g}"
     message += ": before and after it is not the same machine"
     yield Finding("warning", "change", message, row(index, view), remedy)
+
+
+def _other_motion(acceleration: Array, velocity: Array, shape: Array) -> bool:
+    """Whether the motion is another where the shape ends than where it begins: slower, or of other frequencies.
+
+    What friction and inertia are not, springs and bristles among it, then looks like a change of them.
+    """
+    ends = [shape < THIRD, shape > 1.0 - THIRD]
+    pulls, speeds = ([float(np.sqrt(np.mean(x[end] ** 2))) for end in ends] for x in (acceleration, velocity))
+    rates = [pull / max(speed, 1e-300) for pull, speed in zip(pulls, speeds, strict=True)]
+    return any(max(pair) > OTHER_MOTION * min(pair) for pair in (pulls, rates))
 
 
 def _words(name: str, size: float, view: View, alone: bool) -> str:
