@@ -49,6 +49,68 @@ def test_it_says_by_how_much() -> None:
     assert -22.0 < slow.percent_span[0] < -18.0 < slow.percent_span[1] < -14.0
 
 
+OPEN = {
+    "k": (26e3, 1e-12, 6e20), "fs": (59.0, 0.039, 730.0), "fc": (53.6, 53.13, 54.08), "vs": (0.0156, 8.7e-4, 0.0196),
+    "sigma2": (67.0, 63.4, 70.5), "inertia": (30.3, 29.2, 31.3),
+}  # fmt: skip
+"""Of a belt drive's one record: what slow motion would tell is open, by orders of magnitude."""
+
+
+def belt(name: str, factor: float = 1.0) -> Identified:
+    """With that much more friction."""
+    levels = ("fs", "fc", "sigma2")
+    estimates = tuple(
+        Estimate(n, UNITS[n], n, *(f * x for x in (value, (high - low) / 3.92, low, high)), n in IDENTIFIED)
+        for n, (value, low, high) in OPEN.items() for f in [factor if n in levels else 1.0]
+    )  # fmt: skip
+    model = Model("stribeck", **{e.name: e.value for e in estimates if e.name in PARAMETERS["stribeck"]})
+    speeds = {side: np.linspace(5e-4, 0.175, 11) for side in ("positive", "negative")}
+    return Identified(Path(name), model, estimates, np.eye(len(estimates)), speeds=speeds)
+
+
+IDENTIFIED = ("fc", "sigma2", "inertia")
+
+
+def test_what_is_identified_has_changed_although_the_rest_is_open() -> None:
+    """A rise of 20 %, in parameters and at a recorded speed, was denied since k, fs and vs are not identified."""
+    result = compare_models(belt("a"), belt("b", 1.2))
+    assert result.changed
+    every = (*result.changes, *result.levels)
+    assert {c.name for c in every if c.changed} == {"fc", "sigma2", "friction at 0.175 rad/s"}
+    assert result.summary.startswith("The friction has changed: fc +20 % [+19, +22], sigma2 +20 % ")
+    assert result.summary.endswith("Not identified in both, so nothing is said of k, fs, vs.")
+    assert sum(line.endswith("changed") for line in str(result).splitlines()) == 3
+    same = compare_models(belt("a"), belt("b", 1.003))
+    assert not same.changed
+    assert same.summary.startswith(
+        "No change of the friction that the intervals do not explain. Not identified"
+    )
+
+
+def test_a_narrow_interval_that_was_refused_is_not_believed() -> None:
+    """A friction at rest that was extrapolated: its interval does not hold what speaks against it."""
+
+    def with_rest(name: str, fs: float) -> Identified:
+        m = found(name, fs=fs)
+        return replace(
+            m, estimates=tuple(replace(e, identified=e.name != "fs", verdict="no") for e in m.estimates)
+        )
+
+    assert compare_models(found("a", fs=0.3), found("b", fs=0.38)).changed
+    result = compare_models(with_rest("a", 0.3), with_rest("b", 0.38))
+    assert not result.changed
+    assert result.summary.endswith("nothing is said of fs.")
+
+
+def test_one_parameter_that_differs_is_never_denied() -> None:
+    """The joint test of five parameters does not see three standard deviations of one; the last line did not either."""
+    result = compare_models(found("a"), found("b", vs=0.1 * math.exp(0.0473)))
+    (vs,) = [c for c in result.changes if c.p < 0.0125]
+    assert result.p > 0.0125
+    assert vs.changed
+    assert "The friction has changed: vs" in result.summary
+
+
 def test_inertia_is_told_beside_the_friction_whatever_the_laws() -> None:
     for law in ("stribeck", "coulomb"):
         result = compare_models(found("a"), found("b", law, inertia=1.6 * 4e-4, fc=0.3))

@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.compare.levels import Change, common_speeds, levels_of, said_of, unseen
+from stickslip.identify.compare.levels import (
+    Change,
+    believed,
+    common_speeds,
+    levels_of,
+    said_of,
+    unseen,
+)
 from stickslip.identify.compare.motor_or_load import on_one_side
 from stickslip.identify.compare.text import lines
 from stickslip.identify.estimate import Estimate, Picture, Trace
@@ -22,6 +29,8 @@ from stickslip.identify.monte_carlo import curve_band, sliding_torque
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 DRAWS = 400
+RARE = 0.005
+"""Part of the draws beyond either end of what holds nearly all at a velocity: far fewer than the test may err in."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,13 +49,14 @@ class Comparison:
         Chance that curves of the same friction differ as much somewhere, at most: from `DRAWS` drawn, of which one more
         counts than does.
     changed : bool
-        Either test says so; the curves' alone where there is no other.
+        The joint test, the curves or a single parameter say so; the curves alone where a parameter of the law is not
+        identified.
     notes : tuple of str
     picture : Picture
     levels : tuple of Change
         Torques at break-away and at speeds that both records have, whatever the laws are.
     summary : str
-        The verdict, by how much.
+        The verdict, by how much, and of what nothing is said.
     """
 
     changes: tuple[Change, ...]
@@ -107,7 +117,7 @@ def compare_models(
         Highest velocity of the curves, rad/s; otherwise the highest that both records have or, where a file does not
         say, 30 times the law's own velocity, or 1 rad/s.
     level : float
-        Of both tests together: each has half of it.
+        Of all tests together: the curves have half of it; the parameters the other half, all at once and one by one.
 
     Returns
     -------
@@ -137,13 +147,25 @@ def compare_models(
     velocity, low, said = grid_of(first, second, top)
     levels = levels_of(first, second, low, float(velocity[-1]))
     difference, band, curve_p, sides = compared_curves(first, second, velocity, 1.0 - 0.5 * level)
-    changed = bool(np.any(np.abs(difference) > band)) or p < 0.5 * level
     own = {f.name for m in (first, second) for f in m.model.law.fields}
-    summary = said_of(changes, levels, own, changed)
+    single = min((c.p for c in changes if c.of(own) and not math.isnan(p)), default=1.0)
+    changed = bool(np.any(np.abs(difference) > band)) or min(p, single) < 0.25 * level
+    # What the tests together do not bear out is not called changed one by one.
+    changes = tuple(replace(c, decides=changed) if c.of(own) else c for c in changes)
+    levels = tuple(replace(c, decides=changed) for c in levels)
+    summary = said_of(changes, levels, own, changed, untold(first, second))
     return Comparison(
         changes, p, velocity, difference, band, curve_p, changed, (*notes, *unseen(changes, levels), said),
         picture_of(first, velocity, sides, summary, (first, second)), levels, summary,
     )  # fmt: skip
+
+
+def untold(first: Identified, second: Identified) -> tuple[str, ...]:
+    """Parameters of a law of both that are not identified in both; of different laws none is asked for."""
+    if first.model.law.name != second.model.law.name:
+        return ()
+    missing = {e.name: None for m in (first, second) for e in m.law_estimates[0] if not e.identified}
+    return tuple(missing)
 
 
 def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Change, ...], float, list[str]]:
@@ -188,17 +210,15 @@ def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Ch
         if log:
             low, high = x.value * math.expm1(low), x.value * math.expm1(high)
         changes.append(Change(x.name, x.unit, x.value, y.value, low, high, float(p)))
-    # What is not identified may trade places with what is, whose interval then leans on it: a joint test would take
-    # two equally good descriptions of one friction for a change.
-    open_ones = sorted({e.name for m in (first, second) for e in m.law_estimates[0] if not e.identified})
     left = sorted({e.name for e in (*first.estimates, *second.estimates)} - set(names))
     notes = [f"Not compared, since not identified in both: {', '.join(left)}."] if left else []
-    if open_ones and not words:
+    # What is not identified may trade places with what is, whose interval then leans on it: a joint test would take
+    # two equally good descriptions of one friction for a change.
+    if untold(first, second):
         notes.append(
             "As parameters of the law are not identified, the curves alone decide: others may have changed in exchange."
         )
         joint = math.nan
-        changes = [replace(c, decides=c.name.partition("[")[0] not in own) for c in changes]
     return tuple(changes), joint, [*words, *notes]
 
 
@@ -242,32 +262,34 @@ def grid_of(first: Identified, second: Identified, top: float | None) -> tuple[A
 def compared_curves(
     first: Identified, second: Identified, velocity: Array, inside: float
 ) -> tuple[Array, Array, float, list[tuple[Array, Array]]]:  # fmt: skip
-    """Difference of the curves, the half-width that holds that part of whole curves, the chance of such a difference,
-    and each curve's own draws.
+    """Difference of the curves, the half-width towards no difference that holds that part of whole curves, the chance
+    of such a difference, and each curve's own draws.
 
-    The half-width is a multiple of the standard deviation at every velocity, the same multiple at all of them, so
-    that it holds for the curve as a whole.
+    The half-width is a multiple of what holds nearly all draws at a velocity, the same multiple at all of them, so that
+    it holds for the curve as a whole.
     """
     sides: list[tuple[Array, Array]] = []
-    rest = np.zeros((1, velocity.size))
-    count = DRAWS
     for seed, model in enumerate((first, second)):
-        best = sliding_torque(model.model, velocity)
-        drawn = curve_band(model.model, *model.law_estimates, velocity, DRAWS, seed)
-        sides.append((best, drawn))
-        count = min(count, drawn.shape[0])
+        drawn = curve_band(model.model, *believed(model), velocity, DRAWS, seed)
+        sides.append((sliding_torque(model.model, velocity), drawn))
+    count = min(len(drawn) for _, drawn in sides)
     if count < 20:
         raise InputError(
             "the laws refuse nearly all parameters inside the intervals; identify them from more data"
         )
     rest = (sides[1][1][:count] - sides[1][0]) - (sides[0][1][:count] - sides[0][0])
-    spread = np.sqrt(np.mean(rest**2, axis=0))
-    spread = np.maximum(spread, 1e-12 * float(np.max(np.abs(sides[0][0]))))
-    farthest = np.max(np.abs(rest) / spread, axis=1)
-    factor = float(np.quantile(farthest, inside))
+    # No standard deviations: what a parameter that is not identified does in a few draws at one speed would widen the
+    # band at all speeds.
+    ends: Array = np.quantile(rest, [RARE, 1.0 - RARE], axis=0)
+    least = 1e-12 * float(np.max(np.abs(sides[0][0])))
+    below: Array = np.maximum(-ends[0], least)
+    above: Array = np.maximum(ends[1], least)
+    farthest = np.max(np.maximum(-rest / below, rest / above), axis=1)
     difference = sides[1][0] - sides[0][0]
-    as_far = int(np.sum(farthest >= np.max(np.abs(difference) / spread)))
-    return difference, factor * spread, (as_far + 1) / (count + 1), sides
+    towards: Array = np.where(difference > 0.0, below, above)
+    as_far = int(np.sum(farthest >= np.max(np.abs(difference) / towards)))
+    band = float(np.quantile(farthest, inside)) * towards
+    return difference, band, (as_far + 1) / (count + 1), sides
 
 
 def picture_of(

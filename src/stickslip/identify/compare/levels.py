@@ -7,22 +7,28 @@ at speeds that both records have, and at break-away where both models identified
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.monte_carlo import curve_band, sliding_torque
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
 
 DRAWS = 400
 
 
 @dataclass(frozen=True)
 class Change:
-    """One number in both models; ``p`` is the chance of such a difference without a change, after Holm.
+    """One number in both models; ``p`` is the chance of such a difference without a change, after Holm; not a number
+    of a torque, whose interval tells.
 
-    It does not decide (``decides``) where other parameters of the law are not identified: the two may trade places.
+    Of friction it decides (``decides``) only where the tests of all of it together say that friction has changed.
     ``lower`` and ``upper`` bound second less first, 95 %.
     """
 
@@ -37,8 +43,13 @@ class Change:
 
     @property
     def changed(self) -> bool:
-        """At the 5 % level of all parameters together."""
-        return self.decides and self.p < 0.05
+        """At the 5 % level of all parameters together; of a torque, whether its interval leaves 0 out."""
+        return self.decides and self.differs
+
+    @property
+    def differs(self) -> bool:
+        """The same, whatever the other tests say."""
+        return self.told if math.isnan(self.p) else self.p < 0.05
 
     @property
     def percent(self) -> float:
@@ -60,6 +71,10 @@ class Change:
     def told(self) -> bool:
         """Whether its own interval leaves 0 out."""
         return self.lower > 0.0 or self.upper < 0.0
+
+    def of(self, law: Collection[str]) -> bool:
+        """Whether it is one of these parameters, or an element of one."""
+        return self.name.partition("[")[0] in law
 
     def words(self) -> str:
         """Name, change and interval: in per cent, or in its unit where that has no meaning."""
@@ -87,6 +102,16 @@ def common_speeds(first: Identified, second: Identified) -> tuple[float, float] 
     return (low, high) if low < high else None
 
 
+def believed(model: Identified) -> tuple[tuple[Estimate, ...], Array]:
+    """The law's estimates and their correlation; an interval that was refused although narrow is `RATIO` times wider to
+    each side: what speaks against the estimate is not in it."""
+    estimates, correlation = model.law_estimates
+    return tuple(
+        replace(e, lower=e.lower / RATIO, upper=e.upper * RATIO)
+        if not e.identified and e.value > 0.0 and e.upper <= RATIO * e.lower else e for e in estimates
+    ), correlation  # fmt: skip
+
+
 def levels_of(first: Identified, second: Identified, low: float, high: float) -> tuple[Change, ...]:
     """Break-away, and the torque at three speeds from `low` to `high`, rad/s; both ways where a law has two sides."""
     speeds = [low, math.sqrt(low * high), high]
@@ -98,7 +123,7 @@ def levels_of(first: Identified, second: Identified, low: float, high: float) ->
     velocity = np.array(points)
     best = [sliding_torque(m.model, velocity) for m in (first, second)]
     drawn = [
-        curve_band(m.model, *m.law_estimates, velocity, DRAWS, seed) for seed, m in enumerate((first, second))
+        curve_band(m.model, *believed(m), velocity, DRAWS, seed) for seed, m in enumerate((first, second))
     ]
     count = min(len(d) for d in drawn)
     if count < 20:
@@ -112,14 +137,21 @@ def levels_of(first: Identified, second: Identified, low: float, high: float) ->
     )
 
 
-def said_of(changes: Sequence[Change], levels: Sequence[Change], own: set[str], changed: bool) -> str:
-    """The verdict, by how much: of the friction, and of what is beside it."""
-    beside = [c.words() for c in changes if c.changed and c.name.partition("[")[0] not in own]
-    friction = [c.words() for c in changes if c.changed and c.name.partition("[")[0] in own]
-    friction += [c.words() for c in levels if c.told]
+def said_of(
+    changes: Sequence[Change], levels: Sequence[Change], own: Collection[str], changed: bool, untold: Sequence[str]
+) -> str:  # fmt: skip
+    """The verdict, by how much: of the friction, of what is beside it, and of what `untold` is not identified."""
+    beside = [c.words() for c in changes if c.changed and not c.of(own)]
+    friction = ", ".join(c.words() for c in (*(c for c in changes if c.of(own)), *levels) if c.differs)
+    names = ", ".join(untold)
     text = "No change of the friction that the intervals do not explain."
     if changed:
-        text = f"The friction has changed{': ' if friction else ''}{', '.join(friction)}."
+        text = f"The friction has changed{': ' if friction else ''}{friction}."
+    elif friction:
+        why = "chance, or what is not identified, may explain it" if untold else "chance may explain it"
+        text = f"The friction may have changed: {friction}; its curve as a whole does not say so, and {why}."
+    if untold:
+        text += f" Not identified in both, so nothing is said of {names}."
     if beside:
         text += f" Beside it has changed: {', '.join(beside)}."
     return text
@@ -129,7 +161,7 @@ def unseen(changes: Sequence[Change], levels: Sequence[Change]) -> tuple[str, ..
     """What could not have been seen: for each number that did not change, how large a change goes unseen."""
     parts: list[str] = []
     for c in (*changes, *levels):
-        if c.changed or c.told:
+        if c.changed or c.differs or c.told:
             continue
         half = 0.5 * (c.upper - c.lower)
         size = f"{100.0 * half / abs(c.first):.2g} %" if c.first else f"{half:.2g} {c.unit}"

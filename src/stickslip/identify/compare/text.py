@@ -27,7 +27,7 @@ def lines(result: Comparison) -> Iterator[str]:
     if result.levels:
         yield f"{'' if not result.changes else chr(10)}{row(('torque', *HEAD), widths)}"
     for c in result.levels:
-        yield row(cells(c), widths)
+        yield f"{row(cells(c), widths)} {'':<9}{'changed' if c.changed else ''}".rstrip()
     yield ""
     if not math.isnan(result.p):
         yield f"friction parameters together: p {equal_to(result.p)}"
