@@ -121,6 +121,24 @@ def test_inertia_is_told_beside_the_friction_whatever_the_laws() -> None:
     assert any("The laws differ (stribeck, coulomb)" in note for note in result.notes)
 
 
+@pytest.mark.parametrize("turns", [-1, 0, 1, 5])
+def test_a_pendulum_hangs_where_it_did_but_for_whole_turns(turns: int) -> None:
+    """-0.348 and 5.935 rad were called a change of 6.28 rad."""
+
+    def hanging(name: str, angle: float) -> Identified:
+        m = found(name)
+        of_it = Estimate("gravity_angle", "rad", "q_0", angle, 0.02, angle - 0.039, angle + 0.039, True)
+        return replace(m, estimates=(*m.estimates, of_it), correlation=np.eye(len(m.estimates) + 1))
+
+    off = 2.0 * math.pi * turns
+    same = compare_models(hanging("a", -0.348), hanging("b", -0.345 + off))
+    assert same.summary == "No change of the friction that the intervals do not explain."
+    angle = next(c for c in same.changes if c.name == "gravity_angle")
+    assert angle.second == pytest.approx(-0.345)
+    other = compare_models(hanging("a", 3.1), hanging("b", -3.0 + off))
+    assert other.summary.endswith("Beside it has changed: gravity_angle +0.183 rad [+0.128, +0.239].")
+
+
 def test_it_says_what_it_could_not_have_seen() -> None:
     result = compare_models(found("a"), found("b"))
     assert not result.changed

@@ -21,6 +21,7 @@ from stickslip.identify.compare.levels import (
     unseen,
 )
 from stickslip.identify.compare.motor_or_load import on_one_side
+from stickslip.identify.compare.same_turn import ANGLE, in_one_turn
 from stickslip.identify.compare.text import lines
 from stickslip.identify.estimate import Estimate, Picture, Trace
 from stickslip.identify.identified_file import Identified, covariance
@@ -136,7 +137,8 @@ def compare_models(
             )
     if first.motion != second.motion:
         raise InputError(f"{first.path} is a {first.motion} axis and {second.path} a {second.motion} one")
-    second, moved = on_one_side(first, second)
+    # A record's own turn is one of the shaft that it counts, before a gear.
+    second, moved = on_one_side(first, in_one_turn(first, second))
     changes, p, notes = compared_parameters(first, second)
     notes = [moved, *notes] if moved else notes
     hashes = {str(d.get("sha256", "")) for d in first.data} & {str(d.get("sha256", "")) for d in second.data}
@@ -189,7 +191,9 @@ def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Ch
         return (), math.nan, words or ["No parameter is identified in both models."]
     a, ca = chosen(first, names)
     b, cb = chosen(second, names)
-    logs = [min(x.lower, y.lower, x.value, y.value) > 0.0 for x, y in zip(a, b, strict=True)]
+    logs = [
+        x.name != ANGLE and min(x.lower, y.lower, x.value, y.value) > 0.0 for x, y in zip(a, b, strict=True)
+    ]
     total = covariance(a, ca, logs) + covariance(b, cb, logs)
     step = np.array([
         math.log(y.value / x.value) if log else y.value - x.value for x, y, log in zip(a, b, logs, strict=True)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.identify.compare.same_turn import ANGLE
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.identified_file import Identified
@@ -54,9 +55,9 @@ class Change:
     @property
     def percent(self) -> float:
         """Change in per cent of the first value; not a number where that is 0 or less than the interval of the change
-        is wide to one side, as an offset near 0, or the two differ in sign."""
+        is wide to one side, as an offset near 0, or the two differ in sign, or it is an angle."""
         near_zero = abs(self.first) <= 0.5 * (self.upper - self.lower)
-        told = self.first * self.second > 0.0 and not near_zero
+        told = self.first * self.second > 0.0 and not near_zero and self.name != ANGLE
         return 100.0 * (self.second / self.first - 1.0) if told else math.nan
 
     @property
