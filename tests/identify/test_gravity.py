@@ -7,12 +7,15 @@ import math
 import numpy as np
 import pytest
 
+import stickslip as ss
 from stickslip import Model
 from stickslip.identify.axis.gravity import hanging, nearest, within_a_turn
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.regression import regress_axis
+from stickslip.machines.contact import Contact
+from stickslip.machines.motor import Harmonics
 from stickslip.machines.servo import ServoAxis
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
@@ -80,3 +83,30 @@ def test_over_half_a_turn_a_weight_is_no_torque_of_other_orders(swing):
     assert math.hypot(sine.value, cosine.value) == pytest.approx(14.0, rel=0.02)
     assert max(sine.std, cosine.std) < 0.5
     assert found.interval("fc")[0] < 6.3 < found.interval("fc")[1]
+
+
+def test_an_identified_pendulum_is_simulated_as_the_machine_that_its_note_names():
+    """Cogging of order 1 is gravity, exactly; `axis` has neither, and says so."""
+    time = np.arange(0.0, 6.0, 1e-3)
+    reference = 1.2 * np.sin(1.5 * time) + 0.4 * np.sin(5.0 * time)
+    drive = Drive(time, reference, "feedback", Loop(kp=8.0, kd=0.3), max_step=5e-4)
+    law = Model("coulomb", fc=0.2, sigma2=0.02)
+    out = drive_axis(Mechanics(2e-2, gravity=0.6, gravity_angle=0.4), law, drive)
+    record = {"t": time, "position": out[:, 0], "torque": out[:, 2]}
+    found = ss.identify(**record, law="coulomb", pendulum=True)
+    (note,) = [n for n in found.notes if "neither gravity nor offset" in n]
+    amplitude, phase = (float(note.split(name)[1].split()[0]) for name in ("amplitude ", "phase "))
+    assert note in str(found)
+    assert (amplitude, phase) == pytest.approx((0.6, 0.5 * math.pi - 0.4), abs=0.01)
+    plain = ss.identify(**record, law="coulomb")
+    assert not [n for n in plain.notes if "neither gravity" in n]
+
+    def left(gravity: Harmonics) -> float:
+        arm = ss.Machine("arm", 2e-2, Contact(law), cogging=gravity, sample_time=1e-3)
+        loop = ss.Controller(ss.Gains(kp=8.0, ki=0.0, kd=0.3, kr=0.0), sample_time=1e-3)
+        run = ss.simulate(arm, loop, ss.Reference.table(time, reference), 5.9)
+        rows = time < 5.9
+        return float(np.std(np.interp(time[rows], run.time, run["position"]) - out[rows, 0]))
+
+    assert left(Harmonics((1.0,), (0.6,), (0.5 * math.pi - 0.4,))) < 1e-6
+    assert left(Harmonics()) > 0.04

@@ -83,7 +83,10 @@ class IdentificationResult:
 
     @property
     def axis(self) -> RigidAxis:
-        """The axis to simulate: inertia and friction.
+        """The axis to simulate: inertia (kg·m², kg) and friction, without offset and without a pendulum's gravity.
+
+        A `Machine` has gravity, as cogging of order 1 of that amplitude and of the phase pi / 2 - gravity_angle ("An
+        identified pendulum" in the guide to simulations); a constant offset has no place in either.
 
         Raises
         ------

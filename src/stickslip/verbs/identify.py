@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -185,7 +186,12 @@ def with_notes(
     """What was found in the units of the records, with what a reader must know of it."""
     if kind.name not in ("axis", "inertia") and all(r.units.get("position") == "m" for r in records):
         found = along_a_line(found)
-    said = (*assumptions(found, options, kind.name), *load_note(records, found), *more)
+    said = (
+        *assumptions(found, options, kind.name),
+        *load_note(records, found),
+        *weight_note(found),
+        *more,
+    )
     return replace(found, notes=(*found.notes, *said))
 
 
@@ -350,6 +356,18 @@ def load_note(records: Sequence[Record], found: Identification) -> list[str]:
         each = [levels["fc"], levels.get("fc_negative", levels["fc"])]
         said += f", a coefficient of friction F_C / N of {0.5 * sum(each) / mean:.3g}"
     return [f"{said}. No fit here follows the load: identify records of other loads alone."]
+
+
+def weight_note(found: Identification) -> list[str]:
+    """What an axis of inertia and friction leaves out of a pendulum, and what has it; empty of another axis."""
+    mechanics: Any = found.details.get("mechanics")
+    if mechanics is None or not mechanics.gravity:
+        return []
+    phase = math.remainder(0.5 * math.pi - mechanics.gravity_angle, math.tau)
+    return [
+        "A simulated axis (in Python `found.axis`) has inertia and friction, neither gravity nor offset; a machine "
+        f"has this gravity as cogging of order 1, amplitude {mechanics.gravity:.4g} N·m, phase {phase:.4g} rad."
+    ]
 
 
 def law_file(found: Identification, laws: Sequence[str | Law]) -> str:
