@@ -32,6 +32,7 @@ T = np.arange(0.0, 2.0, 1e-3)
         ("give --set bits=VALUE", "export", False, 'give settings={"bits": VALUE}'),
         ("with --leave-out spikes", "identify", False, 'with leave_out=["spikes"]'),
         ("its controller (--loop kp=..,kd=..)", "identify", False, 'its controller (loop={"kp": .., "kd": ..})'),
+        ("give --side load, and", "identify", False, 'give side="load", and'),
         ("identify with --pendulum, or", "identify", False, "identify with pendulum=True, or"),
         ("run `stickslip tune x.toml --out y`", "sweep", False, "run `stickslip tune x.toml --out y`"),
     ],

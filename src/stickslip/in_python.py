@@ -26,7 +26,7 @@ MAPS = re.compile(rf"({MAP}(?: {MAP})*)( (?=--))?")
 ONE_MAP = re.compile(r"--map (?:'([^']+)'|(\S+))")
 SET = re.compile(r"--set (\w+)=(\.\.|[^\s,;:)]*)")
 LOOP = re.compile(r"--loop (\w+=[^\s;)]*[^\s;),])")
-WORD = "method|compensator|to|intervals|linear|accept|leave-out|extra-torque"
+WORD = "side|method|compensator|to|intervals|linear|accept|leave-out|extra-torque"
 OPTION = re.compile(
     rf"--(?:(?P<option>{WORD})(?![\w-])(?: (?P<word>(?!out\b|and\b|or\b)[\w:.-]*\w))?"
     r"|(?P<other>[a-z][a-z-]*)(?: (?P<value>-?[0-9][0-9.e+-]*(?::[0-9]+)?|[A-Z][A-Z_:.a-z]*|inf|nan)(?![\w-]))?)"

@@ -110,3 +110,31 @@ def test_an_identified_pendulum_is_simulated_as_the_machine_that_its_note_names(
 
     assert left(Harmonics((1.0,), (0.6,), (0.5 * math.pi - 0.4,))) < 1e-6
     assert left(Harmonics()) > 0.04
+
+
+def test_a_pendulum_behind_a_gear_is_the_loads():
+    """A motor's angle under a pendulum at the load: gravity came out as a two-thousandth, under a note alone."""
+    ratio, time = 80.0, np.arange(0.0, 10.0, 1e-3)
+    angle = 1.5 * np.sin(0.9 * time) + 0.3 * np.sin(4.0 * time)
+    speed, acceleration = np.gradient(angle, time), np.gradient(np.gradient(angle, time), time)
+    torque = 0.8 * acceleration + 5.0 * np.tanh(speed / 1e-3) + 7.0 * speed + 14.0 * np.sin(angle - 0.4)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(time.size)
+    log = {"t": time, "position": ratio * angle, "torque": torque / ratio + noise}
+    told: list[str] = []
+    found = ss.identify(**log, law="coulomb", pendulum=True, gear_ratio=ratio, tell=told.append)
+    (warned,) = [f for f in found.findings if f.code == "gear-ratio"]
+    assert warned.level == "warning"
+    assert "a pendulum is fitted once a turn of the motor; give --side load" in warned.line()
+    assert any(warned.line() in line for line in told)
+    assert 'a pendulum is fitted once a turn of the motor; give side="load"' in str(found)
+    asked = ss.doctor(**log, gear_ratio=ratio)
+    assert [f.code for f in asked.warnings] == ["gear-ratio"]
+    assert "0.17" in asked.warnings[0].message
+    assert "once a turn of the load" in asked.warnings[0].message
+    assert 'give side="load"' in str(asked)
+    at_load = {**log, "gear_ratio": ratio, "side": "load"}
+    assert [f.code for f in ss.doctor(**at_load).warnings] == ["gravity"]
+    good = ss.identify(**at_load, law="coulomb", pendulum=True)
+    assert "gear-ratio" not in {f.code for f in good.findings}
+    assert good.parameters["gravity"].value == pytest.approx(14.0, rel=0.02)
+    assert good.parameters["gravity"].identified

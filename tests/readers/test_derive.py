@@ -99,5 +99,6 @@ def test_both_sides_of_a_gear(tmp_path):
     (said,) = [f for f in idle.meta["reading"]["findings"] if f["code"] == "gear-ratio"]
     assert said["level"] == "note"
     assert "converts nothing" in said["message"]
+    assert "--side load" in said["remedy"]
     for moved in (motor, load):
         assert "gear-ratio" not in {f["code"] for f in moved.meta["reading"]["findings"]}

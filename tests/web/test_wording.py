@@ -22,6 +22,7 @@ FORM = "under “Columns and units”"
         ("/tmp/x/models/model-1/model.toml holds no motion", "model.toml holds no motion"),
         ("give --torque-constant NM_PER_AMPERE", f"give the torque constant {FORM}"),
         ("leave these out with --leave-out A:B: lost", "leave these out with “Leave this part out”: lost"),
+        ("give --side load, and", f"give “Measured on the side of” = load {FORM}, and"),
         ("name a law (--law)", "name a law (“Laws to choose among” under “Options”)"),
         ("give another file", "give another file"), ("--gears 3", "--gears 3"),
     ],

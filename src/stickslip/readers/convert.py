@@ -253,8 +253,26 @@ def _idle_gear(listed: Sequence[dict[str, Any]], drive: Drive) -> list[Finding]:
     if math.isnan(drive.gear_ratio) or used:
         return []
     message = f"gear ratio {drive.gear_ratio:g} converts nothing: every signal counts as the motor side's"
-    remedy = "say which is the load side's, such as --map position=COLUMN:UNIT@load, or leave it at that"
+    remedy = (
+        "--side load makes a record of the load's side of it, --map position=COLUMN:UNIT@load says what was measured "
+        "there"
+    )
     return [Finding("note", "gear-ratio", message, remedy=remedy)]
+
+
+def pendulum_before_gear(record: Record, told: str) -> list[Finding]:
+    """That a pendulum behind a gear is about the load's angle, and the record about the motor's; `told` is what tells
+    of the pendulum. Empty where it is not so."""
+    drive: dict[str, Any] = record.meta.get("reading", {}).get("drive", {})
+    ratio = float(drive.get("gear_ratio", 1.0))
+    if ratio == 1.0 or drive.get("side", "motor") == "load" or record.units.get("position") != "rad":
+        return []
+    message = (
+        f"{told}, but the record is about the motor's side of the gear of {ratio:g}: a pendulum is fitted once a turn "
+        "of the motor"
+    )
+    remedy = "give --side load, and --map position=COLUMN:UNIT@load for a column that was measured there"
+    return [Finding("warning", "gear-ratio", message, remedy=remedy)]
 
 
 def _torque_from_current(

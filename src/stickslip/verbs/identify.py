@@ -14,6 +14,7 @@ import numpy as np
 from stickslip import plugins
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
+from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import Diagnosis, examine
 from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.experiment import DRIVES
@@ -22,6 +23,7 @@ from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.on_a_line import along_a_line
 from stickslip.identify.regression.regressions import Regress, Regressions
 from stickslip.model import Model
+from stickslip.readers.convert import pendulum_before_gear
 from stickslip.readers.cut import file_rows, pieces
 from stickslip.record import Record
 from stickslip.report.identified import Source
@@ -138,8 +140,8 @@ position_map, load, intervals, robust
     )  # fmt: skip
     examiner = Examiner((*accept, *(["missing-column"] if kind.takes_current else [])), regress, tell)
     sources = sources_of(logs, _listed(hold_out), loop, reading, examiner)
-    if pendulum:  # The doctor's advice is taken.
-        sources = [replace(s, findings=[f for f in s.findings if f.code != "gravity"]) for s in sources]
+    if pendulum:
+        sources = [replace(s, findings=with_pendulum(s)) for s in sources]
     records = [s.record for s in sources]
     options = replace(options, held_out=sum(s.held_out for s in sources))
     if method == "axis" and friction_alone(records, options):
@@ -172,6 +174,13 @@ def identified(kind: Method, sources: Sequence[Source], options: Options) -> Ide
         raise InputError(f"{error}; in {name} {message}: first try --leave-out spikes") from error
 
 
+def with_pendulum(source: Source) -> list[Finding]:
+    """What the doctor found, its advice of a pendulum taken; and that a gear stands before it."""
+    said = pendulum_before_gear(source.record, "a pendulum is asked for")
+    taken = {"gravity", *(f.code for f in said)}
+    return sorted_findings([*said, *(f for f in source.findings if f.code not in taken)])
+
+
 def tell_warnings(sources: Sequence[Source], tell: Callable[[str], None]) -> None:
     """Tell what the doctor warns of."""
     for s in sources:
@@ -189,7 +198,7 @@ def with_notes(
     said = (
         *assumptions(found, options, kind.name),
         *load_note(records, found),
-        *weight_note(found),
+        *(weight_notes(found, records) if options.pendulum else ()),
         *more,
     )
     return replace(found, notes=(*found.notes, *said))
@@ -358,8 +367,12 @@ def load_note(records: Sequence[Record], found: Identification) -> list[str]:
     return [f"{said}. No fit here follows the load: identify records of other loads alone."]
 
 
-def weight_note(found: Identification) -> list[str]:
-    """What an axis of inertia and friction leaves out of a pendulum, and what has it; empty of another axis."""
+def weight_notes(found: Identification, records: Sequence[Record]) -> list[str]:
+    """Of a pendulum that was asked for: that a gear stands before it, or else what an axis of inertia and friction
+    leaves out of it, and what has it."""
+    geared = [f.line() for r in records for f in pendulum_before_gear(r, "A pendulum is asked for")]
+    if geared:
+        return [f"{geared[0]}."]
     mechanics: Any = found.details.get("mechanics")
     if mechanics is None or not mechanics.gravity:
         return []

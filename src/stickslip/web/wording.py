@@ -21,9 +21,9 @@ OPTIONS = {
     "--per-direction": "“Friction of its own in each direction” under “Options”",
     "--nearest": "“Take the nearest that it can hold”", "--bandwidth": "the bandwidth",
     "--torque-limit": "the torque limit", "--from": "the begin of the part", "--to": "its end",
-    "--rows": "the part that is used",
+    "--rows": "the part that is used", "--side": f"“Measured on the side of” = load {FORM}",
 }  # fmt: skip
-VALUES = r"(?: (?:A:B|NM|MM|N|SECONDS|TORQUE|HZ|NUMBER|VALUE|[A-Z_]{2,}))?(?![\w-])"
+VALUES = r"(?: (?:A:B|NM|MM|N|SECONDS|TORQUE|HZ|NUMBER|VALUE|load|[A-Z_]{2,}))?(?![\w-])"
 OPTION = re.compile("|".join(re.escape(name) + VALUES for name in sorted(OPTIONS, key=len, reverse=True)))
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import Array, Smooth, View
 from stickslip.identify.fit.shifts import least_between, shifts_looked_at
+from stickslip.readers.convert import pendulum_before_gear
 
 ROWS = 20_000
 """Rows of a regression: more tell no more."""
@@ -206,26 +207,40 @@ def gravity(view: View) -> Iterator[Finding]:
     if smooth is None or view.torque_channel != "motor_torque":
         return
     plain = _fit(smooth, 0)
-    size = float(np.std(smooth.torque))
-    if view.record.units.get("position") == "rad" and np.ptp(smooth.position) > 0.5 and size > 0.0:
-        full = _fit(smooth, 0, periodic=True)
-        amplitude = math.hypot(full.values[4], full.values[5])
-        if full.rest < 0.7 * plain.rest and 0.1 * size < amplitude < 20.0 * size and full.explained > 0.5:
-            unit = view.record.units["motor_torque"]
-            message = (
-                f"the mean torque depends on the angle: {amplitude:.3g} {unit} once a turn, as gravity does"
-            )
+    if view.record.units.get("position") == "rad":
+        drive: dict[str, Any] = view.record.meta.get("reading", {}).get("drive", {})
+        unit = view.record.units["motor_torque"]
+        own, rest = _once_a_turn(smooth, plain, 1.0)
+        behind, left = _once_a_turn(smooth, plain, float(drive.get("gear_ratio", 1.0)))
+        told = f"the mean torque depends on the load's angle: {behind:.3g} {unit} once a turn of the load"
+        if behind and left < rest and (geared := pendulum_before_gear(view.record, told)):
+            yield from geared
+            return
+        if own:
+            message = f"the mean torque depends on the angle: {own:.3g} {unit} once a turn, as gravity does"
             yield Finding(
                 "warning", "gravity", message, remedy="identify with --pendulum, or turn the axis upright"
             )
             return
-        if _hangs_in_degrees(smooth, min(plain.rest, full.rest)):
+        if _hangs_in_degrees(smooth, min(plain.rest, rest)):
             message = (
                 "the mean torque comes back with 360, as gravity does with a turn: degrees rather than rad"
             )
             yield Finding("warning", "position-unit", message, remedy=f"say {view.mapped('position', 'deg')}")
             return
     yield from _offset(view, smooth, plain)
+
+
+def _once_a_turn(smooth: Smooth, plain: Fit, turns: float) -> tuple[float, float]:
+    """Amplitude of a torque that comes back after so many turns of the position, 0 where it does not; and what that
+    leaves."""
+    size = float(np.std(smooth.torque))
+    if not np.ptp(smooth.position) > 0.5 * turns or size == 0.0:
+        return 0.0, plain.rest
+    full = _fit(smooth, 0, periodic=True, turn=turns * math.tau)
+    amplitude = math.hypot(full.values[4], full.values[5])
+    shows = full.rest < 0.7 * plain.rest and 0.1 * size < amplitude < 20.0 * size and full.explained > 0.5
+    return (amplitude if shows else 0.0), full.rest
 
 
 def _offset(view: View, smooth: Smooth, plain: Fit) -> Iterator[Finding]:
