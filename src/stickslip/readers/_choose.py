@@ -8,12 +8,14 @@ from dataclasses import dataclass
 
 from stickslip.errors import InputError, suggestion
 from stickslip.finding import Finding
-from stickslip.readers._names import ALIASES, KINDS, ROLES, Name, role_of
+from stickslip.readers._names import ALIASES, KINDS, ROLES, Name, motor_force, role_of
 from stickslip.readers._units import parse_unit, spellings
 from stickslip.readers.table_columns import Column, Table
 
 MAIN = ("time", "position", "velocity", "motor_torque")
 """Channels that must not be guessed between equals: the wrong one spoils every result."""
+MOTION = ("position", "velocity")
+"""Channels that say whether the axis turns or moves along a line."""
 AMBIGUOUS = {"grad": "is a degree in German and a gradian in English; say deg, or 0.9 deg for gradians"}
 """Units that a file may have, and nobody should say."""
 
@@ -92,13 +94,18 @@ def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list
     """
     chosen = {role: _explicit(table, role, text) for role, text in mapping.items() if text.lower() != "none"}
     taken = {choice.column for choice in chosen.values()}
-    names = {c.name: role_of(c.name, c.unit if parse_unit(c.unit) else "") for c in table.columns}
+    names = {c.name: role_of(c.name, _unit_of(c)) for c in table.columns}
     axis = next((names[c.column].axis for c in chosen.values() if names[c.column].axis), "")
     findings: list[Finding] = []
     for role in ROLES:
         if role in mapping:
             continue
         candidates = [c for c in table.columns if c.name not in taken and names[c.name].role == role]
+        if role == "motor_torque" and not candidates and _along_a_line(chosen):
+            forces = {c.name: read for c in table.columns if (read := motor_force(c.name, _unit_of(c)))}
+            names |= forces
+            candidates = [c for c in table.columns if c.name in forces and c.name not in taken]
+            findings += [_doubtful(c) for c in candidates if c.name.upper() == "F_N"]
         column, found = _pick(role, candidates, names, axis)
         findings += found
         if column is None:
@@ -135,9 +142,32 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
             )
             raise InputError(f"--map {role}={text}: {unit!r} {what}; {remedy}")
         return Choice(role, column.name, unit, "map", side)
-    read = role_of(column.name, column.unit if parse_unit(column.unit) else "")
+    read = role_of(column.name, _unit_of(column))
     guess = _guessed(role, column, read)
     return Choice(role, column.name, guess.unit, guess.source, side or guess.side)
+
+
+def _unit_of(column: Column) -> str:
+    """The unit that the file gives beside the name, where it is one."""
+    return column.unit if parse_unit(column.unit) else ""
+
+
+def _along_a_line(chosen: Mapping[str, Choice]) -> bool:
+    """Whether the motion that was found is one along a line."""
+    units = [parse_unit(choice.unit) for role, choice in chosen.items() if role in MOTION]
+    kinds = {unit.kind for unit in units if unit is not None}
+    return bool(kinds) and kinds <= {"length", "velocity"}
+
+
+def _doubtful(column: Column) -> Finding:
+    """That F_N may be a force in newtons or a normal force."""
+    name = column.name
+    return Finding(
+        "note",
+        "ambiguous-column",
+        f"column {name!r} was taken as the motor's force in N; it may be a normal force",
+        remedy=f"if it is, say --map torque=none --map load={name}:N",
+    )
 
 
 def _find(table: Table, name: str) -> Column | None:

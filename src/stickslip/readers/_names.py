@@ -75,7 +75,8 @@ WORDS = _table(
         sollgeschwindigkeit geschw dtheta dphi rpm
     acceleration: acceleration acc accel beschleunigung ddtheta acceler
     motor_torque: torque torques trq tau drehmoment moment effort kraft force istmoment sollmoment
-        momentenistwert drehmomentistwert torqueforce tq thrust mist
+        momentenistwert drehmomentistwert torqueforce tq thrust mist motorkraft antriebskraft istkraft
+        sollkraft
     friction_torque: friction reibung reibmoment reibkraft reibungsmoment reibungskraft
     current: current currents strom iq amps iqist stromistwert iststrom motorstrom cur amperage
     voltage: voltage volts spannung volt uq motorspannung vir
@@ -117,7 +118,7 @@ OF_REFERENCE = _words(
     """
     cmd command commanded demand demanded des desired drehzahlsollwert fuehrungsgroesse goal input
     lagesoll lagesollwert nsoll planned possoll ref reference set setpoint setpos setvelo soll
-    solldrehzahl sollgeschwindigkeit solllage sollmoment sollpos sollposition sollwert target trajectory
+    solldrehzahl sollgeschwindigkeit sollkraft solllage sollmoment sollpos sollposition sollwert target trajectory
     vorgabe vsoll ziel
     """
 )
@@ -141,6 +142,10 @@ LOAD_SIDE = frozenset(
         "side2",
     ]
 )
+FORCE = frozenset(["force", "kraft"])
+SENSOR = frozenset(["sensor", "kraftsensor", "kraftaufnehmer"])
+FORCE_SYMBOL = frozenset(["f", "fm", "fmot", "fmotor"])
+"""The force's symbol: a frequency, a friction and a normal force have it too."""
 MOTOR_SIDE = frozenset(["antrieb", "drive", "mot", "motor", "motorseitig", "rotor"])
 SKIP = _words(
     """
@@ -211,19 +216,9 @@ def words(name: str) -> list[str]:
 
 def role_of(name: str, unit: str = "") -> Name:
     """Read a column's name; `unit` is the unit that the file gives besides."""
-    bare, inner = _without_unit(name)
-    if not unit and not inner and not _whole(bare):
-        bare, inner = _without_tail(bare)
-    stated = unit or inner or (bare if bare.lower() in SECONDS else "")
-    parts = words(bare)
+    bare, stated, parts, axis = _pieces(name, unit)
     if not _NO_SIGNAL.isdisjoint(parts):
         return Name("", 0, stated, "", "")
-    axis = ""
-    if not _whole(bare):
-        if parts and (match := re.fullmatch(r"([a-z]+)(\d{1,2})", parts[-1])):
-            parts[-1], axis = match[1], match[2]
-        elif len(parts) > 1 and re.fullmatch(r"\d{1,2}", parts[-1]):
-            axis = parts.pop()
     role, sure = _role(bare, parts)
     parsed = parse_unit(stated) if stated else None
     if not role and parsed is not None:
@@ -233,6 +228,35 @@ def role_of(name: str, unit: str = "") -> Name:
     if role and parsed is not None and parsed.kind not in KINDS[role]:
         role, sure = "", 0
     return Name(role, sure if role else 0, stated, axis, _side(parts, role))
+
+
+def motor_force(name: str, unit: str = "") -> Name | None:
+    """The motor's force by its symbol, as in "F [N]" or "F_motor [N]"; None where name and unit do not say so.
+
+    Only an axis along a line has one: elsewhere F is another force.
+    """
+    _, stated, parts, axis = _pieces(name, unit)
+    parsed = parse_unit(stated)
+    symbol = "".join(w for w in parts if w not in SKIP | OF_REFERENCE | MOTOR_SIDE)
+    if parsed is None or parsed.kind != "force" or symbol not in FORCE_SYMBOL:
+        return None
+    sure = int(OF_REFERENCE.isdisjoint(parts))
+    return Name("motor_torque", sure, stated, axis, _side(parts, "motor_torque"))
+
+
+def _pieces(name: str, unit: str) -> tuple[str, str, list[str], str]:
+    """A name without its unit, the unit, the name's words, and the number of its axis."""
+    bare, inner = _without_unit(name)
+    if not unit and not inner and not _whole(bare):
+        bare, inner = _without_tail(bare)
+    stated = unit or inner or (bare if bare.lower() in SECONDS else "")
+    parts, axis = words(bare), ""
+    if not _whole(bare):
+        if parts and (match := re.fullmatch(r"([a-z]+)(\d{1,2})", parts[-1])):
+            parts[-1], axis = match[1], match[2]
+        elif len(parts) > 1 and re.fullmatch(r"\d{1,2}", parts[-1]):
+            axis = parts.pop()
+    return bare, stated, parts, axis
 
 
 def _without_tail(bare: str) -> tuple[str, str]:
@@ -280,6 +304,10 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
         return role, 2
     is_reference = not OF_REFERENCE.isdisjoint(parts)
     found = [role for role, known in WORDS.items() if not set(known).isdisjoint(parts)]
+    if "load" in found and "normal" in parts and not FORCE.isdisjoint(parts):
+        return "load", 1
+    if found == ["motor_torque"] and not SENSOR.isdisjoint(parts):
+        return "sensor_torque", 1
     if "load" in found and len(found) > 1:
         found.remove("load")  # "load position" is a position on the load's side
     for one in ("friction_torque", "supply"):

@@ -42,7 +42,7 @@ def channels(view: View) -> Iterator[Finding]:
                 "warning",
                 "missing-column",
                 "there is no torque, force or current: only a machine model can replace it",
-                remedy="if a column holds it, say --map torque=COLUMN:Nm",
+                remedy=f"if a column holds it, say --map torque=COLUMN:{view.effort}",
             )
 
 

@@ -261,7 +261,7 @@ def torque_scale(view: View) -> Iterator[Finding]:
         unit = "permille" if _whole(values) and peak > 100.0 else "percent"
         message = (
             f"torques are {kind} up to {peak:.6g}: a share of the rated torque (per mille, percent) or counts"
-            " rather than N·m"
+            f" rather than {'N' if view.linear else 'N·m'}"
         )
         yield Finding(
             "error",
@@ -269,7 +269,7 @@ def torque_scale(view: View) -> Iterator[Finding]:
             message,
             remedy=(
                 f"say {view.mapped('motor_torque', unit)}{_more(view, 'rated_torque', 'TORQUE')}, or"
-                f" {view.mapped('motor_torque', 'Nm')} if it is right"
+                f" {view.mapped('motor_torque', view.effort)} if it is right"
             ),
         )
 

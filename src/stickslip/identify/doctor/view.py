@@ -115,6 +115,17 @@ class View:
         """Whether the record has the channel."""
         return channel in self.record.channels
 
+    @property
+    def linear(self) -> bool:
+        """Whether the axis moves along a line."""
+        units = self.record.units
+        return (units.get("position") or units.get("velocity", "")) in ("m", "m/s")
+
+    @property
+    def effort(self) -> str:
+        """The unit of what drives the axis, as `--map` takes it."""
+        return "N" if self.linear else "Nm"
+
     @cached_property
     def torque_channel(self) -> str:
         """What drives the axis: the motor's torque, a measured friction, or nothing."""
@@ -158,7 +169,7 @@ class View:
         """The regression on certain sliding; None where the record has none, or no position and torque of a motor."""
         if self.torque_channel != "motor_torque" or not self.has("position"):
             return None
-        motion = "linear" if self.record.units.get("position") == "m" else "rotary"
+        motion = "linear" if self.linear else "rotary"
         torque = self.values("motor_torque")
         try:
             return self.regress(
