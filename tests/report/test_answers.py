@@ -22,7 +22,7 @@ from stickslip.record import Record
 from stickslip.report.answers import answers_of, either_way, evidence, meaning_of, one_number_each
 from stickslip.report.axis_pictures import pictures_of
 from stickslip.report.identified import Source, rendered, symbol, tally
-from stickslip.report.next_steps import EXPERIMENTS, MOTIONS, counts_of, lacking
+from stickslip.report.next_steps import EXPERIMENTS, MOTIONS, counts_of, forward, lacking
 from stickslip.report.result_text import result_lines, result_lines_in_python
 from stickslip.report.sliding_torque import over_all_rows, sliding_of
 from stickslip.report.torque_pictures import friction_points, with_gaps
@@ -238,6 +238,16 @@ def test_counts_are_those_of_an_encoder() -> None:
     assert counts_of(log()) == 65536
     smooth = Record(log().time, {"position": np.sin(log().time)}, {"position": "rad"})
     assert counts_of(smooth) == 0
+
+
+@pytest.mark.parametrize(("step", "counts"), [(2.5e-6, 2513274), (5e-7, 12566371), (5e-3 / 65536, 0)])
+def test_counts_of_a_linear_scale_are_those_of_2_pi_metres(step: float, counts: int) -> None:
+    position = step * np.round(log()["position"] / COUNT)
+    line = Record(log().time, {"position": position}, {"position": "m"})
+    assert counts_of(line) == counts
+    ahead = forward(identified(), [line], "model.toml")[0]
+    assert (f"--counts-per-rev {counts}" in ahead.command) is (counts > 0)
+    assert (f"counts_per_rev={counts}" in ahead.python) is ("of 2π m" in ahead.what) is (counts > 0)
 
 
 def test_the_command_line_prints_the_same_in_short() -> None:

@@ -75,7 +75,8 @@ def drive_arguments(parser: argparse.ArgumentParser) -> None:
         "--counts-per-rev",
         type=float,
         metavar="N",
-        help="encoder counts per revolution; 0: no quantisation (default the machine's, or 0)",
+        help="encoder counts per revolution, of a linear axis per 2π m (2π over the scale's step in m); 0: no "
+        "quantisation (default the machine's, or 0)",
     )
     parser.add_argument(
         "--linear",

@@ -44,7 +44,8 @@ class Controller(Composed):
     sample_time : float
         s; 0 acts in continuous time, where all its laws have a continuous form.
     encoder_counts : float
-        Counts per revolution of the encoder that a sampled controller reads; 0 measures exactly.
+        Counts per revolution of the encoder that a sampled controller reads; 0 measures exactly. Of a linear axis the
+        counts in 2π m: 2π over the scale's step in m.
     velocity_filter : float
         Corner of a first-order low-pass on the velocity that the linear part sees, Hz; 0 for none. Only with a sample
         time.

@@ -32,6 +32,8 @@ MOTIONS = {
     "presliding": "slow ramps of the torque to and fro, below break-away", "stickslip": "slow constant speeds",
 }  # fmt: skip
 """What it moves, for a drive that does it in a program of its own."""
+FINEST = 1e-8
+"""m: finer steps are those of printed digits."""
 BY_A_RIG = "stickslip rig run "
 """How its command begins."""
 
@@ -98,7 +100,8 @@ def forward(found: Identification, records: Sequence[Record], model_file: str) -
     arguments = ", ".join(f"{n}={x!r}" if n == "loop" else f"{n}={x}" for n, x in drive.items())
     return [
         Step(
-            "Find the compensator that is safe to switch on, with your drive's loop and sample time in place of these:",
+            "Find the compensator that is safe to switch on, with your drive's loop and sample time in place of these"
+            f"{', counts being those of 2π m' if is_linear(records) and 'counts_per_rev' in drive else ''}:",
             f"stickslip recommend {model} {options} --out {setting}",
             f"advice = ss.recommend(found, {arguments})",
         ),
@@ -124,9 +127,17 @@ def drive_in(records: Sequence[Record]) -> dict[str, str]:
     return out
 
 
+def is_linear(records: Sequence[Record]) -> bool:
+    """Whether positions are lengths."""
+    return any(r.units.get("position") == "m" for r in records)
+
+
 def counts_of(record: Record) -> int:
-    """Counts of the encoder a revolution, where its step shows and is a power of 2 or some thousands; else 0."""
-    if record.units.get("position") != "rad" or "position" not in record.channels:
+    """Counts of the encoder a revolution (of a linear axis, in 2π m), where its step shows; else 0.
+
+    It must be an encoder's: a power of 2 or some thousands a revolution, or a length of two digits.
+    """
+    if "position" not in record.channels:
         return 0
     try:
         step = encoder_step(record["position"])
@@ -135,6 +146,9 @@ def counts_of(record: Record) -> int:
     if not step > 0.0:
         return 0
     counts = 2.0 * math.pi / step
+    if is_linear([record]):
+        near = float(f"{step:.2g}")
+        return round(2.0 * math.pi / near) if step > FINEST and abs(step - near) < 2e-3 * near else 0
     for near in (2 ** round(math.log2(counts)), 1000 * round(counts / 1000.0)):
         if near and counts < 1e6 and abs(counts - near) < 2e-3 * near:
             return int(near)

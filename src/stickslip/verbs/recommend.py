@@ -83,7 +83,8 @@ def recommend(
     sample_time : float, optional
         Of the drive, s; the machine's, or 1e-3.
     counts_per_rev : float, optional
-        Of the encoder; 0: exact. The machine's, or 0.
+        Of the encoder; 0: exact. The machine's, or 0. Of a linear axis the counts in 2π m: 2π over the scale's step
+        in m, 12.57e6 for 0.5 µm.
     torque_limit : float
         N·m
     motion : log, optional
