@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.config import Document, Table, read_toml
-from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
-from stickslip.control.linear import Gains
-from stickslip.control.recommended import Recommended, recommended_in
 from stickslip.errors import InputError, unwritable
 from stickslip.export import CONTROLLER_TARGETS, TARGETS, controller_target, target_named
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.maps import MAP_TARGETS, MapTarget, map_target, written
+from stickslip.export.on_a_line import along_a_line, is_linear, tried
 from stickslip.export.target import Target, settings_of
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.rigid import RigidAxis
@@ -30,8 +28,9 @@ from stickslip.spec import Surroundings
 from stickslip.study.files import prepared_folder
 from stickslip.study.study import load_run
 from stickslip.verbs import own_files
+from stickslip.verbs.export_compensator import CompensatorOptions, compensator_of, recommendation_in
 from stickslip.verbs.export_maps import map_in, only_map
-from stickslip.verbs.export_notes import around_of, axis_of, constant_torque, notes_on, notes_on_controller
+from stickslip.verbs.export_notes import around_of, axis_of, notes_on, notes_on_controller
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import require
 from stickslip.verbs.recommendation import RecommendationResult
@@ -42,8 +41,8 @@ Source = (
 )  # fmt: skip
 """What can be exported; a path is that of a model.toml, a recommended.toml or a `stickslip simulate` file."""
 
-NUMBERS = ("gain", "lead", "deadband", "offset", "inertia_feedforward", "filter_hz")
-"""Of a compensator: what "ff" or "fb" is given, and a recommendation sets."""
+Attempt = Callable[[Export], Check]
+"""How a target tries files of its own."""
 
 
 @constructor_checked
@@ -104,25 +103,6 @@ class ExportResult:
 
     def __repr__(self) -> str:
         return f"<ExportResult: {self.target.name}, {', '.join(self.files)}>"
-
-
-@dataclass(frozen=True)
-class CompensatorOptions:
-    """Numbers of a compensator; None leaves each at what the source says, or its default."""
-
-    sample_time: float | None = None
-    substeps: int | None = None
-    gain: float | None = None
-    lead: float | None = None
-    deadband: float | None = None
-    offset: float | None = None
-    inertia_feedforward: float | None = None
-    filter_hz: float | None = None
-
-    @property
-    def given(self) -> list[str]:
-        """Names of those that are given."""
-        return [f.name for f in fields(self) if getattr(self, f.name) is not None]
 
 
 @arguments_checked
@@ -254,8 +234,12 @@ def exported_controller(
         offset = made.compensator.offset if made.compensator else 0.0
     else:
         made, offset = controller_in(source), 0.0
-    result = carried(source, made, chosen, name, single, check)
-    return replace(result, notes=(*result.notes, *notes_on_controller(content, made, compensator, offset)))
+    target = controller_target(chosen.name)
+    files: Export = target.write(made, name, single, surroundings_of(source))
+    notes = (*files.notes, *notes_on_controller(content, made, compensator, offset))
+    run = target.check if check else None
+    attempt: Attempt | None = (lambda made: run(made, name)) if run else None
+    return finished(content, chosen, name, replace(files, notes=notes), attempt)
 
 
 def exported_law(content: Table, job: Job, chosen: Target, check: bool) -> ExportResult:
@@ -263,8 +247,18 @@ def exported_law(content: Table, job: Job, chosen: Target, check: bool) -> Expor
     settings_of(chosen, job.settings)
     files = chosen.write(job)
     notes = (*files.notes, *around_of(chosen, job), *notes_on(content, job))
-    tried = chosen.check(job, files) if check and chosen.check else None
-    return ExportResult(chosen, job.name, files.files, notes, tried)
+    attempt = partial(chosen.check, job) if check and chosen.check else None
+    return finished(content, chosen, job.name, replace(files, notes=notes), attempt)
+
+
+def finished(
+    content: Table, chosen: Target, name: str, files: Export, attempt: Attempt | None
+) -> ExportResult:
+    """The export, in the units of a linear axis where the source's is one, and tried where that is asked for."""
+    linear = is_linear(content.values)
+    files = along_a_line(files, chosen.name) if linear else files
+    found = attempt(files) if attempt else None
+    return ExportResult(chosen, name, files.files, files.notes, tried(found) if linear else found)
 
 
 def is_whole(source: Source) -> bool:
@@ -333,19 +327,13 @@ def controller_in(source: Source) -> Controller:
     return load_run(Path(source)).control
 
 
-def carried(
-    source: Source, made: Controller, chosen: Target, name: str, single: bool, check: bool
-) -> ExportResult:
-    """A controller as the target has it."""
-    around = Surroundings()
+def surroundings_of(source: Source) -> Surroundings:
+    """The load and temperature that a simulation's file has."""
     if isinstance(source, (str, os.PathLike)) and read_toml(Path(source)).has("reference"):
         axis = load_run(Path(source)).axis
         if isinstance(axis, RigidAxis):
-            around = Surroundings(load=axis.load, temperature=axis.temperature)
-    target = controller_target(chosen.name)
-    files: Export = target.write(made, name, single, around)
-    tried = target.check(files, name) if check and target.check else None
-    return ExportResult(chosen, name, files.files, tuple(files.notes), tried)
+            return Surroundings(load=axis.load, temperature=axis.temperature)
+    return Surroundings()
 
 
 def job_of(source: Source, content: Table, name: str, chosen: Target) -> Job:
@@ -353,47 +341,3 @@ def job_of(source: Source, content: Table, name: str, chosen: Target) -> Job:
     known = axis_of(content)
     settings: dict[str, str | float] = {s.name: known[s.name] for s in chosen.settings if s.name in known}
     return Job(model_of(source, content), name, settings=settings)
-
-
-def compensator_of(content: Table, model: Model, options: CompensatorOptions, compensator: str) -> Controller:
-    """A controller that has nothing but the compensator asked for, with what the file knows of its axis."""
-    if compensator == "recommended":
-        return recommended_on(content, model, options)
-    kinds = {"ff": Feedforward, "fb": Feedback}
-    axis = axis_of(content)
-    known: dict[str, Any] = {
-        "offset": axis.get("offset", 0.0), "inertia_feedforward": axis.get("inertia", 0.0)
-    }  # fmt: skip
-    known |= {n: getattr(options, n) for n in options.given if n != "sample_time"}
-    time = 1e-3 if options.sample_time is None else options.sample_time
-    return Controller(Gains(kp=0.0), kinds[compensator](model, **known), sample_time=time)
-
-
-def recommended_on(content: Table, model: Model, options: CompensatorOptions) -> Controller:
-    """What the file recommends, and nothing that it was not tried with.
-
-    Raises
-    ------
-    InputError
-    """
-    found = recommendation_in(content)
-    for option in options.given:
-        if option in NUMBERS:
-            raise InputError(
-                f"--{option.replace('_', '-')} and --compensator recommended, which sets it; leave it out, or give "
-                "--compensator ff or fb"
-            )
-    tried, asked = found.sample_time, options.sample_time
-    if tried and asked is not None and not math.isclose(tried, asked):
-        raise InputError(
-            f"--sample-time {asked:g}: {content.document.name} is recommended for {tried:g} s; leave it out, or "
-            "run `stickslip recommend` with that sample time"
-        )
-    made = replace(found.on(model), substeps=1 if options.substeps is None else options.substeps)
-    return Controller(Gains(kp=0.0), made, sample_time=tried or asked or 1e-3)
-
-
-def recommendation_in(content: Table) -> Recommended:
-    """What a file recommends, with the constant torque that it holds of its axis."""
-    found = recommended_in(content)
-    return found if found.offset else replace(found, offset=constant_torque(content))

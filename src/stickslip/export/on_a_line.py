@@ -1,0 +1,42 @@
+"""Exports of a linear axis: targets write N·m, rad and kg·m², whatever the axis; along a line these are N, m and kg."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from stickslip.export.job import Check, Export
+from stickslip.identify.on_a_line import words
+
+WORDED = ("c99", "arduino", "python", "matlab", "st", "linuxcnc")
+"""Targets whose files have units in comments and words alone: others declare units that simulators compute with."""
+VECTORS = ".csv"
+"""Golden vectors keep the names of their columns, by which programs find them."""
+UNITS = re.compile(r"(?<![A-Za-z0-9_.])([mµk]?)(N[·*]m|kg[·*]m(?:²|\^2)|rad)(?![A-Za-z0-9_]|\.[A-Za-z])")
+"""A unit in a comment, also in ASCII's letters; not a part of an identifier or of a file's name."""
+LINEAR = {"N": "N", "k": "kg", "r": "m"}
+
+
+def is_linear(content: Mapping[str, object]) -> bool:
+    """Whether the content of a model's file says that the axis moves along a line."""
+    return content.get("motion") == "linear"
+
+
+def along_a_line(export: Export, target: str) -> Export:
+    """The same files with the units of a linear axis in their words, or a note where the target has its own units."""
+    notes = tuple(words(note) for note in export.notes)
+    if target not in WORDED:
+        said = "the axis is linear: N·m, rad and kg·m² in these files stand for N, m and kg"
+        return Export(export.files, (*notes, said))
+    return Export({name: _text(name, content) for name, content in export.files.items()}, notes)
+
+
+def tried(check: Check | None) -> Check | None:
+    """What a check found, with the units of a linear axis."""
+    return None if check is None else Check(check.passed, words(check.text), check.numbers)
+
+
+def _text(name: str, content: str | bytes) -> str | bytes:
+    if isinstance(content, bytes) or name.endswith(VECTORS):
+        return content
+    return UNITS.sub(lambda found: found[1] + LINEAR[found[2][0]], content)
