@@ -51,11 +51,11 @@ REST = 10.0
 class Signals(NamedTuple):
     """What a control law sees in one sample."""
 
-    position: Annotated[float, Par("rad", "theta", "measured position, minus the whole turns")]
+    position: Annotated[float, Par("rad", "theta", "measured position, minus the turns split off")]
     moved: Annotated[float, Par("rad", "", "change of the measured position since the last usable sample")]
     velocity: Annotated[float, Par("rad/s", "v", "velocity by the controller's estimator")]
     slow_velocity: Annotated[float, Par("rad/s", "v_f", "the same through a slow low-pass, for gates")]
-    reference: Annotated[float, Par("rad", "theta_d", "reference position, minus the whole turns")]
+    reference: Annotated[float, Par("rad", "theta_d", "reference position, minus its own turns split off")]
     reference_velocity: Annotated[float, Par("rad/s", "v_d", "reference velocity")]
     reference_acceleration: Annotated[float, Par("rad/s²", "a_d", "reference acceleration")]
     error: Annotated[float, Par("rad", "e", "reference minus measured position")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -14,6 +15,8 @@ from stickslip.control.registry import control_law, control_law_names
 from stickslip.control_spec import ControlLaw
 from stickslip.simulation.compiled_controller import FAULT, compiled, replay
 from stickslip.spec import Par, Surroundings
+
+TURN = 2.0 * math.pi
 
 ALL = {
     "-".join([law.name, *law.chosen.values()]): law
@@ -124,6 +127,51 @@ def test_what_begins_to_grow_after_half_an_hour_at_rest_is_told():
 @pytest.mark.parametrize("name", BROKEN)
 def test_what_breaks_the_contract_is_told(name):
     assert name in [v.name for v in examine(BROKEN[name]) if v.passed is False]
+
+
+class Pendulum(NamedTuple):
+    """Of laws whose torque depends on the absolute angle."""
+
+    gravity: Annotated[float, Par("N·m", "G", "gravity torque", positive=True)]
+    hangs: Annotated[float, Par("rad", "q_0", "angle at which it hangs")]
+    stiffness: Annotated[float, Par("N·m/rad", "k", "stiffness")]
+
+
+class WrongUnit(NamedTuple):
+    """The same, one unit wrong."""
+
+    gravity: Annotated[float, Par("N·m", "G", "gravity torque", positive=True)]
+    hangs: Annotated[float, Par("rad", "q_0", "angle at which it hangs")]
+    stiffness: Annotated[float, Par("N·m", "k", "stiffness")]
+
+
+def pulled(y, z, p, u):
+    angle = TURN * (y.turns - math.floor(y.turns)) + y.position
+    return p.gravity * math.sin(angle + y.error - p.hangs) + p.stiffness * y.error
+
+
+def pulled_by_a_part(y, z, p, u):
+    return p.gravity * math.sin(y.reference - p.hangs) + p.stiffness * y.error
+
+
+def pendulum(sample, params=Pendulum, stiffness=1.0):
+    example = {"gravity": 0.4, "hangs": -0.35, "stiffness": stiffness}
+    return ControlLaw(
+        "pendulum", params, sample, "feedforward", title="x", equation="x", source=("own",), example=example
+    )
+
+
+def test_a_torque_of_the_absolute_angle_keeps_the_contract():
+    assert [v for v in examine(pendulum(pulled)) if v.passed is False] == []
+
+
+def test_what_is_wrong_with_a_torque_of_the_absolute_angle_is_told():
+    said = {v.name: v.text for v in examine(pendulum(pulled, WrongUnit)) if v.passed is False}
+    assert list(said) == ["units"]
+    assert "other units of angle" in said["units"]
+    said = {v.name: v.text for v in examine(pendulum(pulled_by_a_part)) if v.passed is False}
+    assert "single precision" not in said or "turns" in said
+    assert said["turns"].endswith("write 2π y.turns + y.position, and + y.error for the reference's angle")
 
 
 def divides(y, z, p, u):
