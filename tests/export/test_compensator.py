@@ -1,15 +1,19 @@
 """A compensator leaves whole: offset, inertia, gain, lead and deadband, or the export says what it leaves out."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from test_c99 import COMPILERS, CONTROL, answers, built_controller
 
+import stickslip as ss
 from stickslip.cli import main
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.control.recommended import read_recommended
 from stickslip.errors import ParameterError
+from stickslip.export.job import Check
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.rigs.loop import Loop
@@ -161,3 +165,20 @@ def test_what_cannot_be_fed_forward_is_refused(wrong, said):
         Feedforward(COULOMB, **wrong)
     with pytest.raises(ParameterError, match="offset needs a sampled controller"):
         Controller(Gains(1.0), Feedback(COULOMB, offset=0.1))
+
+
+def test_a_printed_export_says_what_its_check_found():
+    made = ss.export(
+        Controller(Gains(kp=0.0), Feedforward(COULOMB), sample_time=1e-3), to="python", check=True
+    )
+    assert str(made).splitlines()[-1] == f"check: {made.check.text}"
+    failed = dataclasses.replace(made, check=Check(False, "gcc: 0.5 N·m off the definition"))
+    assert str(failed).endswith("check failed: gcc: 0.5 N·m off the definition")
+    assert "check" not in str(dataclasses.replace(made, check=None)).splitlines()[-1]
+
+
+@pytest.mark.parametrize(("gain", "what"), [(0.0, "compensator"), (5.0, "controller")])
+def test_a_simulation_unit_is_titled_by_what_it_holds(gain, what):
+    made = ss.export(Controller(Gains(kp=gain), Feedforward(COULOMB), sample_time=1e-3), to="fmu")
+    assert made.target.title == f"FMI 2.0 and 3.0 co-simulation unit of a sampled {what}"
+    assert ss.export(COULOMB, to="fmu").target.title.endswith("a contact that is moved")

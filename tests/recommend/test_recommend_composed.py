@@ -26,6 +26,7 @@ from stickslip.recommend.candidates import Setting
 from stickslip.recommend.recommend import Drive, recommend
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.virtual import virtual_rig
+from stickslip.verbs.recommend import refuse_beside
 
 T = 1e-3
 LAW = Model("coulomb", fc=0.285, sigma2=0.018)
@@ -176,6 +177,14 @@ def test_the_command_writes_a_controller_that_runs_and_is_exported(tmp_path, mon
     assert main(track) == 0
     assert main([*line, "--bandwidth", "20"]) == 2
     assert "--bandwidth cannot be combined with --controller loop.toml" in capsys.readouterr().err
+
+
+def test_what_a_controller_sets_is_refused_beside_it_in_short():
+    with pytest.raises(
+        ss.InputError,
+        match=r"^--sample-time cannot be combined with --controller, which sets it; leave it out$",
+    ):
+        refuse_beside(Controller(loop=LOOP, sample_time=T), sample_time=T)
 
 
 def test_a_recommendation_that_is_a_whole_controller_is_exported_as_one(few):

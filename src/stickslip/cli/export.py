@@ -147,8 +147,6 @@ def run(args: argparse.Namespace) -> int:
         )
     else:
         print(made)
-        if made.check:
-            print(f"check: {made.check.text}")
     return 1 if made.check and made.check.passed is False else 0
 
 

@@ -31,6 +31,8 @@ class ControllerTarget(NamedTuple):
     the name is none in the target's language"""
     check: Callable[[Export, str], Check] | None = None
     """``check(export, name)``: run the export in its tool against the golden samples"""
+    title: str = ""
+    """Of its files, {} for what they hold (`what_it_is`), where it is another one than of a law alone"""
 
 
 def checked_name(name: str) -> str:
@@ -94,6 +96,11 @@ def settings_of(controller: Controller) -> dict[str, float]:
 def compensates_alone(controller: Controller) -> bool:
     """Whether it has no loop: its torque belongs to that of another controller."""
     return not any(block.law.place == "loop" for block in controller.blocks.values())
+
+
+def what_it_is(controller: Controller) -> str:
+    """A compensator where it has no loop, else a controller."""
+    return "compensator" if compensates_alone(controller) else "controller"
 
 
 def depends_on(controller: Controller) -> str:

@@ -33,6 +33,7 @@ from stickslip.export.controllers import (
     head_of,
     settings_of,
     trees_of,
+    what_it_is,
 )
 from stickslip.export.golden import Samples, as_csv, sampled_torques
 from stickslip.export.job import Check, Export
@@ -86,7 +87,7 @@ def write(controller: Controller, name: str, single: bool = False, around: Surro
         wholes_of(controller.fields, values), ", ".join(f.name for f in controller.fields if f.par.shares),
     )  # fmt: skip
     files, notes = units_of(
-        contents, "fmu_controller.c.j2", variables, "Sampled controller of a servo axis", slope=None,
+        contents, "fmu_controller.c.j2", variables, f"Sampled {what_it_is(controller)} of a servo axis", slope=None,
         sample_time=repr(controller.sample_time), unlimited=repr(UNLIMITED),
     )  # fmt: skip
     readme = render(
@@ -124,4 +125,4 @@ def check(export: Export, name: str) -> Check:
     return checked(export, time, dt, given, {"torque": expected})
 
 
-CONTROLLER = ControllerTarget(write, check)
+CONTROLLER = ControllerTarget(write, check, "FMI 2.0 and 3.0 co-simulation unit of a sampled {}")

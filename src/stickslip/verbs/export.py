@@ -16,6 +16,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.errors import InputError, unwritable
 from stickslip.export import CONTROLLER_TARGETS, TARGETS, controller_target, target_named
+from stickslip.export.controllers import what_it_is
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.maps import MAP_TARGETS, MapTarget, map_target, written
 from stickslip.export.on_a_line import along_a_line, is_linear, tried
@@ -99,7 +100,10 @@ class ExportResult:
 
     def __str__(self) -> str:
         lines = [f"{self.target.title}:", *(f"  {path}" for path in self.paths or self.files)]
-        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+        lines += [f"note: {note}" for note in self.notes]
+        if self.check:
+            lines.append(f"check{' failed' * (self.check.passed is False)}: {self.check.text}")
+        return "\n".join(lines)
 
     def __repr__(self) -> str:
         return f"<ExportResult: {self.target.name}, {', '.join(self.files)}>"
@@ -239,7 +243,8 @@ def exported_controller(
     notes = (*files.notes, *notes_on_controller(content, made, compensator, offset))
     run = target.check if check else None
     attempt: Attempt | None = (lambda made: run(made, name)) if run else None
-    return finished(content, chosen, name, replace(files, notes=notes), attempt)
+    titled = replace(chosen, title=target.title.format(what_it_is(made)) or chosen.title)
+    return finished(content, titled, name, replace(files, notes=notes), attempt)
 
 
 def exported_law(content: Table, job: Job, chosen: Target, check: bool) -> ExportResult:

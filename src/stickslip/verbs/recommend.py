@@ -66,7 +66,7 @@ def recommend(
     model : IdentificationResult or path
         What `identify` gave, or the model.toml that it saved.
     bandwidth, damping : float
-        Of the position loop's poles, Hz and -.
+        Of the position loop's poles, Hz and -. Refused beside `loop` and `controller`, which have their gains.
     linear : {"PD", "PID", "PR"}
         What they place.
     loop : str or mapping, optional
@@ -81,7 +81,7 @@ def recommend(
         resonances, delay, amplifier, encoder and noise, and the identified friction and inertia. Without it on rigid
         axes.
     sample_time : float, optional
-        Of the drive, s; the machine's, or 1e-3.
+        Of the drive, s; the machine's, or 1e-3. Refused beside `controller`, which has its own.
     counts_per_rev : float, optional
         Of the encoder; 0: exact. The machine's, or 0. Of a linear axis the counts in 2π m: 2π over the scale's step
         in m, 12.57e6 for 0.5 µm.
@@ -208,8 +208,9 @@ def refuse_beside(controller: object, **given: object) -> None:
     for name, value in given.items():
         if value != USUAL[name]:
             option = name.replace("_", "-")
+            file = f" {controller}" if isinstance(controller, (str, os.PathLike)) else ""
             raise InputError(
-                f"--{option} cannot be combined with --controller {controller}, which sets it; leave it out"
+                f"--{option} cannot be combined with --controller{file}, which sets it; leave it out"
             )
 
 
