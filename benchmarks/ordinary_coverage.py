@@ -1,8 +1,8 @@
 """How often the numbers called identified hold on ordinary logs, cell by cell.
 
-    python benchmarks/ordinary_coverage.py                        # all 720 cells, one record each: half an hour on
-    two cores python benchmarks/ordinary_coverage.py --every 10 --law lugre
-    python benchmarks/ordinary_coverage.py --plain                # the regression on certain sliding alone: two minutes
+    python benchmarks/ordinary_coverage.py                # all 720 cells, one record each: half an hour on two cores
+    python benchmarks/ordinary_coverage.py --every 10 --law lugre
+    python benchmarks/ordinary_coverage.py --plain        # the regression on certain sliding alone: two minutes
 
 Logs are those of `ordinary_logs.py`, in which nothing of the package takes part. A second table shows plain least
 squares: the inverse dynamics in four lines of numpy.
