@@ -67,6 +67,6 @@ def test_what_to_measure_next_does_not_contradict_the_verdict() -> None:
     below = told(START, parameter(positive=True), -0.0125, -0.0214, -0.0036, math.nan)
     assert advice([below], coulomb) == ("Log torque and motion by one clock, without filters of their own.",)
     assert advice([START], coulomb, APART.format(share=6.0)) == (
-        "Record gentler accelerations: motor and load then move as one.",
+        "Record longer moves with gentler accelerations: motor and load then move as one.",
     )
     assert advice([START], coulomb) == ("Record stronger accelerations.",)

@@ -276,7 +276,7 @@ def advice(estimates: Sequence[Estimate], law: Law, doubt: str = "") -> tuple[st
     elif any(NOT_TOGETHER in e.verdict for e in estimates):
         out.append("Log torque and motion by one clock, without filters of their own.")
     elif NOT_AS_ONE in doubt:
-        out.append("Record gentler accelerations: motor and load then move as one.")
+        out.append("Record longer moves with gentler accelerations: motor and load then move as one.")
     elif "inertia" in missing:
         out.append("Record stronger accelerations.")
     if "fc" in missing:

@@ -82,7 +82,10 @@ AT_ONE_SPEED = (
 STILL_ROUGH = "motor and load do not move as one even in the windows in which they do so best, and "
 UNSURE_THERE, ROUGHLY = "it is unsure to {share:.0%} there; identified means at most {most:.0%}", 0.1
 NOT_AS_ONE = "the axis does not follow its torque as one inertia does"
-APART = f"{NOT_AS_ONE}: what its acceleration needs is unsure to {{share:.2g}} of Fc; record gentler motion"
+APART = (
+    f"{NOT_AS_ONE}, or slides too briefly: what its acceleration needs is unsure to {{share:.2g}} of Fc; record longer "
+    "and gentler motion"
+)
 BEYOND = 2.0
 """Times Fc that may be left of the torque in certain sliding for anything to be believed."""
 BEYOND_LEVEL = (
