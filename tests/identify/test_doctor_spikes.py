@@ -49,7 +49,19 @@ def test_spikes_in_the_torque_are_counted_with_their_rows():
 def test_a_single_row_within_the_range_is_a_spike_and_named():
     _, _, torque = motion()
     torque[5000] += 3.0
-    assert "by their rows: 5001" in codes(record(torque))["spikes"]
+    said = codes(record(torque))["spikes"]
+    assert "by their rows: 5001" in said
+    assert "1 spike of up to" in said
+
+
+def test_a_spike_below_what_is_usual_is_told_by_its_neighbours():
+    """ "1 spikes of up to -6830 N, where 1.338e+04 is usual" """
+    _, _, torque = motion()
+    row = int(np.argmax(torque))
+    torque[row] = -0.9 * torque[row]
+    said = codes(record(torque))["spikes"]
+    assert "has 1 spike, up to " in said
+    assert "away from the rows before and after" in said
 
 
 def test_a_spike_of_the_position_is_no_wrap():

@@ -55,16 +55,24 @@ def spikes(view: View) -> Iterator[Finding]:
         if not index.size:
             continue
         values, unit = view.record[channel], view.record.units[channel]
-        usual = float(np.percentile(np.abs(np.delete(values, index)), 98))
-        largest = float(values[index[np.argmax(np.abs(values[index]))]])
-        message = (
-            f"{channel} has {index.size} spikes of up to {largest:.4g} {unit}, where {usual:.4g} is usual"
-        )
+        message = f"{channel} has {_size_of(values, index, unit)}"
         rows = view.file_rows[index]
         remedy = "leave them out with --leave-out spikes"
         if index.size <= NAMED:
             remedy += f", or by their rows: {range_words(rows)}"
         yield Finding("warning", "spikes", message, row(int(index[0]), view), remedy)
+
+
+def _size_of(values: Array, index: Any, unit: str) -> str:
+    """How many spikes there are, and how large beside what is usual; beside their neighbours where they are less."""
+    usual = float(np.percentile(np.abs(np.delete(values, index)), 98))
+    largest = float(values[index[np.argmax(np.abs(values[index]))]])
+    many = "1 spike" if index.size == 1 else f"{index.size} spikes"
+    if abs(largest) > usual:
+        return f"{many} of up to {largest:.4g} {unit}, where {usual:.4g} is usual"
+    before, after = np.maximum(index - 1, 0), np.minimum(index + 1, values.size - 1)
+    apart = np.minimum(np.abs(values[index] - values[before]), np.abs(values[index] - values[after]))
+    return f"{many}, up to {float(np.max(apart)):.4g} {unit} away from the rows before and after"
 
 
 def spike_rows(record: Record) -> Any:
