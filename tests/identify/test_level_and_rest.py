@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from stickslip.identify.axis.agreed import BAND_ALONE, told_apart
-from stickslip.identify.axis.falling import AT_REST, widened, with_rest
+from stickslip.identify.axis.falling import AT_REST, NO_LEVEL, widened, with_level, with_rest
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.result import HELD_BY_FRICTION, constant_torque_told
 from stickslip.identify.estimate import Estimate
@@ -172,6 +172,17 @@ def test_a_constant_torque_is_not_identified_where_friction_is_not() -> None:
     assert refused.verdict == HELD_BY_FRICTION
     assert constant_torque_told([offset, level]) == (offset, level)
     assert constant_torque_told([offset]) == (offset,)  # a law without such a level
+
+
+def test_no_fall_is_better_known_than_the_level_that_it_ends_at() -> None:
+    rest, fall = estimate("fs", 0.3, 0.29, 0.31), estimate("vs", 0.1, 0.09, 0.11)
+    back, level = estimate("fs_negative", 0.3, 0.29, 0.31), estimate("fc_negative", 0.2, 0.19, 0.21)
+    untold = replace(estimate("fc", 0.2, 0.1, 0.3), identified=False, verdict="wide")
+    judged = {e.name: e for e in with_level([rest, fall, back, untold, level])}
+    assert {n for n, e in judged.items() if e.identified} == {"fs_negative", "fc_negative"}
+    assert judged["fs"].verdict == judged["vs"].verdict == NO_LEVEL
+    told = [rest, fall, estimate("fc", 0.2, 0.19, 0.21)]
+    assert list(with_level(told)) == told
 
 
 def test_within_which_way_friction_is_built_up_again(logs: Any) -> None:

@@ -18,11 +18,13 @@ from stickslip.identify.axis.agreed import (
     agreed,
     as_good,
     held_against,
+    known_to_act,
     sliding_values,
     told_apart,
 )
 from stickslip.identify.axis.choice import Candidate
 from stickslip.identify.axis.exponent import predicted_with, with_other
+from stickslip.identify.axis.falling import with_level
 from stickslip.identify.axis.output import OutputError
 from stickslip.identify.axis.prediction import axis_prediction
 from stickslip.identify.axis.problem import Problem
@@ -246,4 +248,5 @@ def checked(result: PredictionError | Fitted, evidence: Evidence) -> tuple[tuple
     if inverse is not None:
         estimates, more = beside_plain(estimates, result.model, inverse, sliding)
         said = [*said, *more]
-    return told_apart(estimates, sliding), said
+    estimates = told_apart(estimates, sliding)
+    return (estimates if known_to_act(sliding) else with_level(estimates)), said
