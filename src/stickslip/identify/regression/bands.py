@@ -57,6 +57,8 @@ BACKGROUND = 12
 TELLING, NARROW = 4.0, 0.1
 """A band tells of a number where its standard deviation is at most so many times the smallest, or that part of the
 value."""
+WEIGHT = (0.5 / math.pi,)
+"""Cycles a radian of a pendulum's weight."""
 ROTATED = {"gravity_sin", "gravity_cos"}
 
 
@@ -182,14 +184,14 @@ def in_bands(
     bands: list[BandFit] = []
     widest: list[SlidingRows] = []
     chosen: dict[str, Any] = {}
-    creep = NOWHERE
+    creep, weight = NOWHERE, WEIGHT if axis.gravity == "pendulum" else ()
     lacking = InputError("no band of the record slides long enough in one direction")
     for factor in BANDS:
         try:
             if not bands:
                 known = options["skew"]
                 start = clear_skew(signals, factor * width) if known is None else known
-                widest, falls, creep = rows_of(signals, factor * width, start, exponents)
+                widest, falls, creep = rows_of(signals, factor * width, start, exponents, weight)
                 own = {**options, "start": start}
                 chosen = {
                     "start": start,
@@ -198,7 +200,7 @@ def in_bands(
                 rows = widest
             else:
                 skew = bands[0].numbers["skew"].value
-                rows, falls, _ = rows_of(signals, factor * width, skew, exponents)
+                rows, falls, _ = rows_of(signals, factor * width, skew, exponents, weight)
             bands.append(fit_band(rows, falls, **{**options, **chosen}))
         except InputError as error:
             lacking = error
@@ -230,7 +232,7 @@ def orders_in(
     """Orders of a torque over the position that show, and the lowest others, which may be there but are small."""
     skew = fit_band(rows, falls, **options).numbers["skew"].value
     candidates = candidate_orders(rows, axis.motion == "rotary", period)
-    own = [0.5 / math.pi] if axis.gravity == "pendulum" else []
+    own = WEIGHT if axis.gravity == "pendulum" else ()
     candidates = candidates[len(own) :]  # the first is a pendulum's own
     curve = [k for k, fall in enumerate(falls) if fall.exponent in GAUSSIAN][::CURVE]
     shown = shown_orders(rows, skew, candidates, curve, own)
@@ -281,17 +283,18 @@ def misfits(rows: Sequence[SlidingRows], shifts: Whole) -> Array:
 
 
 def rows_of(
-    signals: Sequence[Signals], width: float, skew: float, exponents: Sequence[float]
-) -> tuple[list[SlidingRows], list[Fall], Creep]:
+    signals: Sequence[Signals], width: float, skew: float, exponents: Sequence[float],
+    known: Sequence[float] = (),
+) -> tuple[list[SlidingRows], list[Fall], Creep]:  # fmt: skip
     """Rows seen through one window, without those where friction is still being rebuilt or the axis creeps with too
-    little of it; the falls tried; and that creeping."""
+    little of it; the falls tried; and that creeping. `known` are cycles a radian (m) of a pendulum's weight."""
     windows = [Window(width, s.period) for s in signals]
     first = [sliding_rows(s, w) for s, w in zip(signals, windows, strict=True)]
     speed = np.abs(stacked(first, "speed"))
     top = float(np.max(speed))
     levels = np.geomspace(max(float(np.min(speed)), SLOWEST * top), FASTEST * top, LEVELS).tolist()
     falls = [Fall.like(vs, exponent) for exponent in exponents for vs in levels]
-    way = rebuilding_way(first, skew)
+    way = rebuilding_way(first, skew, known)
     rows = [r.falling_at(falls).farther(way) for r in first]
     rows = [r for r in rows if r.time.size >= FEWEST]
     if not rows:

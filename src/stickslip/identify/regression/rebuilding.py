@@ -21,11 +21,11 @@ FEWEST = 3
 """Rows at about the same way, to say anything."""
 
 
-def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:
+def rebuilding_way(records: Sequence[SlidingRows], skew: float, known: Sequence[float] = ()) -> float:
     """Way after a reversal or stop over which friction is still being built up again, rad (m).
 
     Pre-sliding, play and wind-up all leave friction below its level there, whatever their law. Both directions are
-    left.
+    left. `known` are cycles a radian (m) of a torque over the position: a pendulum's weight.
     """
     fixed, gone = stacked(records, "fixed"), stacked(records, "gone")
     most = [
@@ -33,28 +33,31 @@ def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:
         for side in (-1.0, 1.0)
         if np.any(fixed[:, 2] * side > 0.0)
     ]
-    last, _ = lacking_until(records, skew)
+    last, _ = lacking_until(records, skew, known)
     return min(MARGIN * last, *most)
 
 
-def rebuilt_within(records: Sequence[SlidingRows], skew: float) -> float:
+def rebuilt_within(records: Sequence[SlidingRows], skew: float, known: Sequence[float] = ()) -> float:
     """Way after a reversal or stop within which friction is there again, rad (m): the last at which it lacks, or the
     first that is seen; infinite where no level shows."""
-    return max(lacking_until(records, skew))
+    return max(lacking_until(records, skew, known))
 
 
-def lacking_until(records: Sequence[SlidingRows], skew: float) -> tuple[float, float]:
+def lacking_until(
+    records: Sequence[SlidingRows], skew: float, known: Sequence[float] = ()
+) -> tuple[float, float]:
     """The way after a reversal or stop at which friction lacks last, 0 where it never does, and the first that is seen,
     rad (m)."""
     fixed, gone = stacked(records, "fixed"), stacked(records, "gone")
     torque = np.concatenate([r.torque(skew) for r in records])
     middle = float(np.median(gone))
     far = gone >= middle
-    values = np.linalg.lstsq(fixed[far], torque[far], rcond=1e-9)[0]
+    columns = np.column_stack([fixed, *(np.concatenate([r.around(k) for r in records]) for k in known)])
+    values = np.linalg.lstsq(columns[far], torque[far], rcond=1e-9)[0]
     level = float(values[2])
     if level <= 0.0 or middle <= 0.0:
         return 0.0, math.inf
-    lacking = (torque - fixed @ values) * fixed[:, 2] / level
+    lacking = (torque - columns @ values) * fixed[:, 2] / level
     edges = np.geomspace(max(float(gone.min()), 1e-9 * middle), middle, 25)
     last, first = 0.0, middle
     for low, high in itertools.pairwise(edges.tolist()):

@@ -26,6 +26,7 @@ from stickslip.identify.regression.band_system import USUAL_EXPONENTS, least_squ
 from stickslip.identify.regression.bands import (
     ROTATED,
     USUALLY,
+    WEIGHT,
     calmed,
     decided,
     in_bands,
@@ -373,10 +374,11 @@ def regress_axis(
     for way in ("", "_positive", "_negative") if each_way else ("",):
         numbers[f"fc{way}"] = with_form(numbers[f"fc{way}"], numbers[f"sigma2{way}"])
     numbers["skew"] = Number(skew, size) if skew is not None else as_told(numbers, size, period)
+    weight = WEIGHT if axis.gravity == "pendulum" else ()
     whole = [sliding_rows(s, Window(width, s.period)) for s in signals]
     return Regression(
         numbers, bands, seen.orders, falls, falling, float(np.quantile(speed, 0.01)), float(np.max(speed)), period,
-        seen.rows, seen.widened, seen.creep, each_way, rebuilt_within(whole, numbers["skew"].value),
+        seen.rows, seen.widened, seen.creep, each_way, rebuilt_within(whole, numbers["skew"].value, weight),
     )  # fmt: skip
 
 
