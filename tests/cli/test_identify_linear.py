@@ -13,7 +13,7 @@ import pytest
 from stickslip.cli import main
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.identified_file import read_identified
-from stickslip.identify.on_a_line import along_a_line, words
+from stickslip.identify.on_a_line import worded, words
 from stickslip.machines.servo import ServoAxis
 
 ANGULAR = re.compile(r"N·m|(?<![a-z])m?rad(?![a-z])|kg·m²")
@@ -62,9 +62,25 @@ def test_verdicts_of_the_axis_are_in_newtons() -> None:
     found = Identification(
         "axis", None, (rotary,), np.eye(1), {}, ("fc: 0.7429 N·m against 3 N·m·s/rad",), details=details
     )
-    said = along_a_line(found)
+    said = worded(found)
     assert said.estimates[0].verdict == "the torque asks for -158 N (-1.36 at most)"
     assert said.notes == ("fc: 0.7429 N against 3 N·s/m",)
+
+
+def test_the_axis_of_a_linear_record_says_newtons(
+    staircase: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Inertia, level and slope of a staircase: what is not identified says so in N and m."""
+    assert main(["identify", str(staircase), "--law", "lugre", "--no-report", "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert " N·s/m" in said
+    assert not ANGULAR.search(said)
+
+
+def test_a_pendulum_along_a_line_is_refused(staircase: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It gave "gravity 1.68e7 N"."""
+    assert main(["identify", str(staircase), "--pendulum", "--no-report"]) == 2
+    assert "leave out --pendulum" in capsys.readouterr().err
 
 
 def test_misfits_in_json_are_named_by_their_unit(

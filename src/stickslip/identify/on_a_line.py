@@ -20,17 +20,23 @@ def along_a_line(found: Identification) -> Identification:
 
     A result that knows its axis (`Identification.details`, ``axis``) has its pictures right already.
     """
-    estimates = tuple(replace(e, unit=LINEAR.unit(e.unit), verdict=words(e.verdict)) for e in found.estimates)
-    found = replace(
-        found, estimates=estimates, misfit=in_newtons(found.misfit), notes=tuple(words(n) for n in found.notes),
-        measure_next=tuple(words(n) for n in found.measure_next),
-    )  # fmt: skip
+    found = worded(found)
+    estimates = tuple(replace(e, unit=LINEAR.unit(e.unit)) for e in found.estimates)
+    found = replace(found, estimates=estimates, misfit=in_newtons(found.misfit))
     if isinstance(found.details.get("axis"), ServoAxis):
         return found
     details: dict[str, Any] = {**found.details, "axis": LINEAR}
     if "comparison" in details:
         details["comparison"] = {name: in_newtons(cells) for name, cells in details["comparison"].items()}
     return replace(found, details=details, pictures=tuple(picture(p) for p in found.pictures))
+
+
+def worded(found: Identification) -> Identification:
+    """The same with verdicts, notes and what to measure next in the units of a linear axis."""
+    return replace(
+        found, estimates=tuple(replace(e, verdict=words(e.verdict)) for e in found.estimates),
+        notes=tuple(words(n) for n in found.notes), measure_next=tuple(words(n) for n in found.measure_next),
+    )  # fmt: skip
 
 
 def in_newtons(numbers: Mapping[str, Any]) -> dict[str, Any]:

@@ -132,6 +132,11 @@ class ServoAxis:
                 raise ParameterError(
                     f"axis: {name} = {getattr(self, name)!r} must be one of {', '.join(allowed)}"
                 )
+        if self.motion == "linear" and self.gravity == "pendulum":
+            raise ParameterError(
+                "axis: a pendulum turns, and this axis moves along a line, where weight is part of the offset; leave "
+                "out --pendulum"
+            )
         positive("axis", "gear_ratio", self.gear_ratio, "-")
         if self.drive_gain is not None:
             positive("axis", "drive_gain", self.drive_gain, "N·m per unit of the drive's signal")

@@ -20,7 +20,7 @@ from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.experiment import DRIVES
 from stickslip.identify.methods import method_named
 from stickslip.identify.methods.method import Method, Options
-from stickslip.identify.on_a_line import along_a_line
+from stickslip.identify.on_a_line import along_a_line, worded
 from stickslip.identify.regression.regressions import Regress, Regressions
 from stickslip.model import Model
 from stickslip.readers.convert import pendulum_before_gear
@@ -193,8 +193,9 @@ def with_notes(
     found: Identification, kind: Method, records: Sequence[Record], options: Options, more: Sequence[str]
 ) -> Identification:
     """What was found in the units of the records, with what a reader must know of it."""
-    if kind.name not in ("axis", "inertia") and all(r.units.get("position") == "m" for r in records):
-        found = along_a_line(found)
+    if all(r.units.get("position") == "m" for r in records):
+        # Those two know their axis: their numbers have its units.
+        found = worded(found) if kind.name in ("axis", "inertia") else along_a_line(found)
     said = (
         *assumptions(found, options, kind.name),
         *load_note(records, found),
