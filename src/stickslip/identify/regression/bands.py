@@ -184,14 +184,14 @@ def in_bands(
     bands: list[BandFit] = []
     widest: list[SlidingRows] = []
     chosen: dict[str, Any] = {}
-    creep, weight = NOWHERE, WEIGHT if axis.gravity == "pendulum" else ()
+    creep = NOWHERE
     lacking = InputError("no band of the record slides long enough in one direction")
     for factor in BANDS:
         try:
             if not bands:
                 known = options["skew"]
                 start = clear_skew(signals, factor * width) if known is None else known
-                widest, falls, creep = rows_of(signals, factor * width, start, exponents, weight)
+                widest, falls, creep = rows_of(signals, factor * width, start, exponents)
                 own = {**options, "start": start}
                 chosen = {
                     "start": start,
@@ -200,7 +200,7 @@ def in_bands(
                 rows = widest
             else:
                 skew = bands[0].numbers["skew"].value
-                rows, falls, _ = rows_of(signals, factor * width, skew, exponents, weight)
+                rows, falls, _ = rows_of(signals, factor * width, skew, exponents)
             bands.append(fit_band(rows, falls, **{**options, **chosen}))
         except InputError as error:
             lacking = error
@@ -283,18 +283,17 @@ def misfits(rows: Sequence[SlidingRows], shifts: Whole) -> Array:
 
 
 def rows_of(
-    signals: Sequence[Signals], width: float, skew: float, exponents: Sequence[float],
-    known: Sequence[float] = (),
-) -> tuple[list[SlidingRows], list[Fall], Creep]:  # fmt: skip
+    signals: Sequence[Signals], width: float, skew: float, exponents: Sequence[float]
+) -> tuple[list[SlidingRows], list[Fall], Creep]:
     """Rows seen through one window, without those where friction is still being rebuilt or the axis creeps with too
-    little of it; the falls tried; and that creeping. `known` are cycles a radian (m) of a pendulum's weight."""
+    little of it; the falls tried; and that creeping."""
     windows = [Window(width, s.period) for s in signals]
     first = [sliding_rows(s, w) for s, w in zip(signals, windows, strict=True)]
     speed = np.abs(stacked(first, "speed"))
     top = float(np.max(speed))
     levels = np.geomspace(max(float(np.min(speed)), SLOWEST * top), FASTEST * top, LEVELS).tolist()
     falls = [Fall.like(vs, exponent) for exponent in exponents for vs in levels]
-    way = rebuilding_way(first, skew, known)
+    way = rebuilding_way(first, skew)
     rows = [r.falling_at(falls).farther(way) for r in first]
     rows = [r for r in rows if r.time.size >= FEWEST]
     if not rows:

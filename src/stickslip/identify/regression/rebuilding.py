@@ -21,11 +21,11 @@ FEWEST = 3
 """Rows at about the same way, to say anything."""
 
 
-def rebuilding_way(records: Sequence[SlidingRows], skew: float, known: Sequence[float] = ()) -> float:
+def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:
     """Way after a reversal or stop over which friction is still being built up again, rad (m).
 
     Pre-sliding, play and wind-up all leave friction below its level there, whatever their law. Both directions are
-    left. `known` are cycles a radian (m) of a torque over the position: a pendulum's weight.
+    left. Of a pendulum the weight lacks as well, so that more is left out: where it turns, a coarse position says least.
     """
     fixed, gone = stacked(records, "fixed"), stacked(records, "gone")
     most = [
@@ -33,13 +33,16 @@ def rebuilding_way(records: Sequence[SlidingRows], skew: float, known: Sequence[
         for side in (-1.0, 1.0)
         if np.any(fixed[:, 2] * side > 0.0)
     ]
-    last, _ = lacking_until(records, skew, known)
+    last, _ = lacking_until(records, skew)
     return min(MARGIN * last, *most)
 
 
 def rebuilt_within(records: Sequence[SlidingRows], skew: float, known: Sequence[float] = ()) -> float:
     """Way after a reversal or stop within which friction is there again, rad (m): the last at which it lacks, or the
-    first that is seen; infinite where no level shows."""
+    first that is seen; infinite where no level shows.
+
+    `known` are cycles a radian (m) of a torque over the position beside it: a pendulum's weight.
+    """
     return max(lacking_until(records, skew, known))
 
 
