@@ -79,6 +79,19 @@ def test_the_code_is_that_of_any_axis(tmp_path, to, compensator):
     assert any(ROTARY.search(text) for text in round_.files.values())
 
 
+def test_an_export_that_is_called_as_a_unit_keeps_its_name(tmp_path):
+    """``from rad import Contact`` became ``from m import Contact``."""
+    made = ss.export(model(tmp_path, "linear"), to="python", name="rad")
+    assert "rad.py" in made.files
+    assert not re.search(r"\b(from|import) m\b", " ".join(made.files.values()))
+    assert made.notes[-1].startswith("the axis is linear")
+
+
+def test_what_a_turn_stands_for_is_said(tmp_path):
+    made = ss.export(model(tmp_path, "linear"), to="c99", compensator="ff")
+    assert any("a turn in these files stands for 2π m" in note for note in made.notes)
+
+
 def test_a_target_that_declares_units_says_what_they_stand_for(tmp_path):
     line, round_ = (ss.export(model(tmp_path, motion), to="modelica") for motion in ("linear", "rotary"))
     assert line.notes[-1] == "the axis is linear: N·m, rad and kg·m² in these files stand for N, m and kg"

@@ -58,7 +58,8 @@ def test_a_model_that_leaves_more_torque_than_there_is_tells_nothing() -> None:
     known = Estimate("inertia", "kg·m²", "J", 1.0, 0.01, 0.98, 1.02, True)
     (bad,) = explaining([known], {"force_relative": 1.43, "inverse_dynamics_relative": 0.143})
     assert (bad.identified, bad.verdict[:50]) == (False, "the model leaves 143% of the torque over the whole")
-    for misfit in ({"force_relative": 1.43, "inverse_dynamics_relative": 0.9}, {"force_relative": 0.9}, {}):
+    for misfit in ({"force_relative": 1.43, "inverse_dynamics_relative": 0.9}, {"force_relative": 0.9}, {},
+                   {"force_relative": 1.2, "inverse_dynamics_relative": math.nan}):  # fmt: skip
         assert explaining([known], misfit) == (known,)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from stickslip import Record
 from stickslip.identify.doctor import examine
+from stickslip.identify.doctor.change import other_motion
 
 SWITCH = 0.43
 COUNT = 2.0 * np.pi / 2**18
@@ -119,3 +120,14 @@ def test_creeping_after_fast_steps_is_no_other_inertia(logs: Any, seed: int, col
     log = logs.draw(seed, column, 500, "feedforward", "staircase", "cogging")
     channels = {"position": log.position, "motor_torque": log.torque}
     assert said(Record(log.time, channels, {"position": "rad", "motor_torque": "N·m"})) == ""
+
+
+@pytest.mark.parametrize(("ratio", "other"), [(1.0, False), (2.0, False), (4.0, True)])
+@pytest.mark.parametrize("gradual", [False, True])
+def test_a_sweep_is_another_motion_at_its_end(ratio: float, other: bool, gradual: bool) -> None:
+    """Its frequencies, of one acceleration, were called a change of the inertia by +991 %."""
+    x = np.linspace(0.0, 1.0, 6000)
+    shape = x if gradual else np.heaviside(x - 0.5, 1.0)
+    rate = 10.0 * np.where(shape > 0.5, ratio, 1.0)
+    phase = np.cumsum(rate) * 1e-2
+    assert other_motion(np.cos(phase), np.sin(phase) / rate, shape) is other

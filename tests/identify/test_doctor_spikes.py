@@ -61,6 +61,10 @@ def test_a_spike_below_what_is_usual_is_told_by_its_neighbours():
     torque[row] = -0.9 * torque[row]
     said = codes(record(torque))["spikes"]
     assert "has 1 spike, up to " in said
+    torque = motion()[2]
+    torque[row : row + 2] *= -0.9
+    two = codes(record(torque)).get("spikes", "")
+    assert "up to 0 " not in two
     assert "away from the rows before and after" in said
 
 

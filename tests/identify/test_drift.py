@@ -137,6 +137,10 @@ def test_a_pendulum_hangs_where_it_did_but_for_whole_turns(turns: int) -> None:
     assert angle.second == pytest.approx(-0.345)
     other = compare_models(hanging("a", 3.1), hanging("b", -3.0 + off))
     assert other.summary.endswith("Beside it has changed: gravity_angle +0.183 rad [+0.128, +0.239].")
+    # Of two shafts neither turn is the other's: 32 rad at a motor of 80 turns are 0.4 at the load, or 0.479, ...
+    two = [replace(hanging(s, a), axis={**found(s).axis, "seen_from": s, "gear_ratio": 80.0})
+           for s, a in (("load", 0.4), ("motor", 32.0))]  # fmt: skip
+    assert "gravity_angle" not in [c.name for c in compare_models(*two).changes]
 
 
 def test_it_says_what_it_could_not_have_seen() -> None:

@@ -98,6 +98,9 @@ def test_an_identified_pendulum_is_simulated_as_the_machine_that_its_note_names(
     amplitude, phase = (float(note.split(name)[1].split()[0]) for name in ("amplitude ", "phase "))
     assert note in str(found)
     assert (amplitude, phase) == pytest.approx((0.6, 0.5 * math.pi - 0.4), abs=0.01)
+    upright = drive_axis(Mechanics(2e-2), law, drive)
+    none = ss.identify(t=time, position=upright[:, 0], torque=upright[:, 2], law="coulomb", pendulum=True)
+    assert not [n for n in none.notes if "cogging of order 1" in n]
     plain = ss.identify(**record, law="coulomb")
     assert not [n for n in plain.notes if "neither gravity" in n]
 

@@ -16,7 +16,10 @@ from stickslip.identify.axis.result import HELD_BY_FRICTION, constant_torque_tol
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter
+from stickslip.identify.fit.smooth import Window
 from stickslip.identify.regression.band_fit import Number
+from stickslip.identify.regression.bands import WEIGHT
+from stickslip.identify.regression.rebuilding import rebuilt_within
 from stickslip.identify.regression.regression import (
     AT_ONE_SPEED,
     LEVEL_UNTOLD,
@@ -24,6 +27,7 @@ from stickslip.identify.regression.regression import (
     regress_axis,
     with_form,
 )
+from stickslip.identify.regression.sliding_rows import narrowest_width, signals_of, sliding_rows
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Par
 
@@ -185,9 +189,22 @@ def test_no_fall_is_better_known_than_the_level_that_it_ends_at() -> None:
     assert list(with_level(told)) == told
 
 
+def slow_pendulum() -> Experiment:
+    """Of 14 N·m, with friction of 6 N·m that is there at once behind every reversal."""
+    time = np.arange(0.0, 20.0, 2e-3)
+    position = 1.0 - np.cos(0.6 * time) + 0.05 * (1.0 - np.cos(8.0 * time))
+    velocity = np.gradient(position, time)
+    torque = 0.8 * np.gradient(velocity, time) + 6.0 * np.sign(velocity) + 14.0 * np.sin(position + 0.35)
+    return Experiment("joint", time, position, torque)
+
+
 def test_within_which_way_friction_is_built_up_again(logs: Any) -> None:
     """A few times the way of the bristles, where the record turns slowly; it cannot be told where windows are wide."""
     found, truth = regressed(logs, 70003, "actual", 1000, "pid", "staircase", "flexible")
     assert truth["fc"] / truth["sigma0"] < found.rebuilt < 1e-3
+    swing, axis = slow_pendulum(), ServoAxis(drive_side="load", gravity="pendulum")
+    signals = signals_of(swing, axis)
+    rows = [sliding_rows(signals, Window(narrowest_width(signals), signals.period))]
+    assert rebuilt_within(rows, 0.0, WEIGHT) < 0.1 * rebuilt_within(rows, 0.0)
     fast, truth = regressed(logs, 70013, "commanded", 1000, "feedforward", "sine", "clean")
     assert 1e-3 < truth["fc"] / truth["sigma0"] * 10.0 < fast.rebuilt

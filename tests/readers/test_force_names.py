@@ -54,6 +54,10 @@ def test_another_force_is_not_the_motor_s(name, channel):
     assert set(read("x [mm]", name).channels) == {"position"} | ({channel} if channel else set())
 
 
+def test_a_sensor_of_the_motor_s_torque_is_the_motor_s():
+    assert set(read("q [deg]", "sensor_torque_motor [Nm]").channels) == {"position", "motor_torque"}
+
+
 def test_a_force_by_its_symbol_alone_is_no_motor_s_where_the_axis_turns():
     assert "motor_torque" not in read("q [deg]", "F_N").channels
     both = read("x [mm]", "F_N", "motor force [N]")

@@ -81,6 +81,9 @@ def test_a_lead_in_millimetres_where_metres_are_asked_is_refused():
     ):
         Drive(lead=40.0)
     assert Drive(lead=0.04).lead == 0.04
+    for screw in (2.0, 5.0, 10.0):
+        with pytest.raises(InputError, match="on the command line"):
+            Drive(lead=screw)
 
 
 @pytest.mark.parametrize("lead", ["0", "-3", "nan", "inf"])

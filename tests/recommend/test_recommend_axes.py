@@ -63,6 +63,18 @@ def test_friction_whose_level_no_record_told_is_not_fed_forward() -> None:
 
 
 @pytest.mark.usefixtures("few")
+def test_what_half_of_the_sampled_axes_give_is_said() -> None:
+    advice = recommend(identified(), Drive(20.0, amplitude=0.1, torque_limit=3.0), axes=1, confirm=4)
+    assert advice.chosen
+    left = sorted(advice.chosen.errors[1:])
+    assert advice.usual_reduction == pytest.approx(1.0 - 0.5 * (left[1] + left[2]))
+    assert advice.reduction[0] < advice.usual_reduction < advice.reduction[1]
+    none = recommend(identified(), Drive(20.0, amplitude=0.1, torque_limit=3.0), axes=1, confirm=0)
+    assert math.isnan(none.usual_reduction)
+    assert none.as_dict()["usual_reduction"] is None
+
+
+@pytest.mark.usefixtures("few")
 def test_a_level_that_is_told_to_a_factor_of_two_is_fed_forward_where_it_helps_all_over_it() -> None:
     """Of 32 axes that were refused, 16 got a setting so, which took 52 to 97 % off."""
     unsure = identified(estimate("fc", "N·m", LEVEL["fc"], 0.17, identified=False))
@@ -134,6 +146,11 @@ def test_a_fall_below_the_slowest_certain_sliding_is_on_drawn_axes() -> None:
     assert 1.0 <= min(ratios) < 1.2
     assert 1.7 < max(ratios) <= MOST_STATIC
     assert all(0.05 <= p.friction.parameters.vs <= 0.3 for p in plants)
+    each = Model("coulomb", {"symmetry": "asymmetric"}, fc=0.3, fc_negative=0.1, sigma2=0.018)
+    uneven = replace(identified(), model=each, misfit={"slowest_sliding": 0.5})
+    for plant in list(plants_of(uneven, INERTIA, 40, 1))[1:]:
+        p = plant.friction.parameters
+        assert p.fs_negative / p.fc_negative == pytest.approx(p.fs / p.fc)
 
 
 @pytest.mark.parametrize("misfit", [{}, {"fall_missing_Nm": 0.1, "fall_missing_velocity": 0.9}])

@@ -240,7 +240,9 @@ def test_counts_are_those_of_an_encoder() -> None:
     assert counts_of(smooth) == 0
 
 
-@pytest.mark.parametrize(("step", "counts"), [(2.5e-6, 2513274), (5e-7, 12566371), (5e-3 / 65536, 0)])
+@pytest.mark.parametrize(
+    ("step", "counts"), [(2.5e-6, 2513274), (5e-7, 12566371), (5e-3 / 65536, 0), (1e-5, 0), (1e-7, 0)]
+)
 def test_counts_of_a_linear_scale_are_those_of_2_pi_metres(step: float, counts: int) -> None:
     position = step * np.round(log()["position"] / COUNT)
     line = Record(log().time, {"position": position}, {"position": "m"})

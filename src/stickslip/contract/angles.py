@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import FunctionType, SimpleNamespace
 from typing import Any
@@ -22,10 +22,14 @@ ALIKE = 1e-6
 """Of the limit: what a torque may differ by as positions are split."""
 
 
-def in_other_angles(law: ControlLaw, factor: float) -> ControlLaw:
-    """The law where angles are `factor` times as large: sines take them so, and a turn is as much larger."""
+def in_other_angles(law: ControlLaw, factor: float, gives: Sequence[str] = GIVES) -> ControlLaw:
+    """The law where angles are `factor` times as large: sines take them so, and a turn is as much larger.
+
+    `gives` are the functions that give such an angle; an arcus tangent may as well smooth a sign. Numbers that a
+    function writes out stay what they are.
+    """
     functions: dict[str, Callable[..., float]] = {n: _taking(getattr(math, n), factor) for n in TAKES}
-    functions |= {n: _giving(getattr(math, n), factor) for n in GIVES}
+    functions |= {n: _giving(getattr(math, n), factor) for n in gives}
     turned = {"pi": factor * math.pi, "tau": factor * TURN}
     other = SimpleNamespace(**{**vars(math), **functions, **turned})
     choices = tuple(
@@ -43,16 +47,22 @@ def in_other_angles(law: ControlLaw, factor: float) -> ControlLaw:
 
 
 def _rebound(function: Any, other: SimpleNamespace, factor: float) -> Any:
-    """The function with other sines; numbers of its file that are a turn, or half of one, are as much larger."""
+    """The function with other sines; numbers of its file that are parts of a turn are as much larger."""
     if not isinstance(function, FunctionType):
         return function
     names: dict[str, Any] = {}
     for name, value in function.__globals__.items():
         if value is math:
             names[name] = other
-        elif isinstance(value, float) and value in (math.pi, TURN):
+        elif isinstance(value, float) and _part_of_a_turn(value):
             names[name] = factor * value
     return bound(function, names)
+
+
+def _part_of_a_turn(value: float) -> bool:
+    """Whether a number is a whole number of twelfths of π, to its last digits."""
+    parts = 12.0 * value / math.pi
+    return parts != 0.0 and abs(parts) < 1e3 and abs(parts - round(parts)) < 1e-14 * abs(parts)
 
 
 def _taking(function: Callable[[float], float], factor: float) -> Callable[[float], float]:

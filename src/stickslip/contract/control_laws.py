@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.contract.angles import in_other_angles, turns
+from stickslip.contract.angles import GIVES, in_other_angles, turns
 from stickslip.contract.description import bounds
 from stickslip.contract.rest import at_rest
 from stickslip.contract.specimens import (
@@ -180,8 +180,10 @@ def units(law: ControlLaw) -> Verdict:
         apart = float(np.abs(in_other_units(law, law, factors, inputs, slow) - here).max())
         if what == "angle" and not apart <= SAME:
             # A sine of the angle itself takes rad: in other units of angle it is another function.
-            sines = in_other_units(law, in_other_angles(law, factors[1]), factors, inputs, slow)
-            apart = min(apart, float(np.abs(sines - here).max()))
+            for gives in (GIVES, ()):
+                turned = in_other_angles(law, factors[1], gives)
+                sines = in_other_units(law, turned, factors, inputs, slow)
+                apart = min(apart, float(np.abs(sines - here).max()))
         if not apart <= SAME:
             return failed(
                 "units", f"in other units of {what} the torque is {apart:.2g} N·m off; correct a unit"

@@ -10,6 +10,7 @@ from stickslip.identify.on_a_line import words
 
 WORDED = ("c99", "arduino", "python", "matlab", "st", "linuxcnc")
 """Targets whose files have units in comments and words alone: others declare units that simulators compute with."""
+TURN = "the axis is linear: a turn in these files stands for 2π m"
 VECTORS = ".csv"
 """Golden vectors keep the names of their columns, by which programs find them."""
 UNITS = re.compile(r"(?<![A-Za-z0-9_.])([mµk]?)(N[·*]m|kg[·*]m(?:²|\^2)|rad)(?![A-Za-z0-9_]|\.[A-Za-z])")
@@ -22,13 +23,16 @@ def is_linear(content: Mapping[str, object]) -> bool:
     return content.get("motion") == "linear"
 
 
-def along_a_line(export: Export, target: str) -> Export:
-    """The same files with the units of a linear axis in their words, or a note where the target has its own units."""
+def along_a_line(export: Export, target: str, own: str) -> Export:
+    """The same files with the units of a linear axis in their words; or a note where the target has its own units, or
+    the export's `own` name is that of a unit."""
     notes = tuple(words(note) for note in export.notes)
-    if target not in WORDED:
+    if target not in WORDED or UNITS.fullmatch(own):
         said = "the axis is linear: N·m, rad and kg·m² in these files stand for N, m and kg"
         return Export(export.files, (*notes, said))
-    return Export({name: _text(name, content) for name, content in export.files.items()}, notes)
+    files = {name: _text(name, content) for name, content in export.files.items()}
+    turns = any("turn" in content for content in files.values() if isinstance(content, str))
+    return Export(files, (*notes, TURN) if turns else notes)
 
 
 def tried(check: Check | None) -> Check | None:

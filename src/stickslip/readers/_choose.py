@@ -105,11 +105,12 @@ def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list
             forces = {c.name: read for c in table.columns if (read := motor_force(c.name, _unit_of(c)))}
             names |= forces
             candidates = [c for c in table.columns if c.name in forces and c.name not in taken]
-            findings += [_doubtful(c) for c in candidates if c.name.upper() == "F_N"]
         column, found = _pick(role, candidates, names, axis)
         findings += found
         if column is None:
             continue
+        if role == "motor_torque" and column.name.upper() == "F_N":
+            findings.append(_doubtful(column))
         axis = axis or names[column.name].axis
         taken.add(column.name)
         chosen[role] = _guessed(role, column, names[column.name])

@@ -306,7 +306,7 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
     found = [role for role, known in WORDS.items() if not set(known).isdisjoint(parts)]
     if "load" in found and "normal" in parts and not FORCE.isdisjoint(parts):
         return "load", 1
-    if found == ["motor_torque"] and not SENSOR.isdisjoint(parts):
+    if found == ["motor_torque"] and not SENSOR.isdisjoint(parts) and MOTOR_SIDE.isdisjoint(parts):
         return "sensor_torque", 1
     if "load" in found and len(found) > 1:
         found.remove("load")  # "load position" is a position on the load's side

@@ -35,8 +35,8 @@ MOTION = (
 EFFORT = ("motor_torque", "friction_torque", "sensor_torque", "compensation_torque")
 NUMBERS = ("counts_per_rev", "rated_torque", "rated_current", "torque_constant", "gear_ratio", "lead")
 """What a drive's data sheet says, each a positive number."""
-LONGEST_LEAD = 5.0
-"""m a revolution: more moves no screw, pinion, pulley or drum."""
+LONGEST_LEAD = 1.6
+"""m a revolution, of a drum of half a metre: a lead in millimetres is more, but for the finest screws."""
 
 
 @dataclass(frozen=True, slots=True)

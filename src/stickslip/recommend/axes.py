@@ -46,7 +46,7 @@ LOST_MOTION = (1e-4, 1e-2)
 MOST_STATIC = 2.0
 """Static over Coulomb torque at most, where the record does not tell it: contacts of machines have 1 to 2."""
 HIDDEN = (0.1, 0.6)
-"""Of the slowest certain sliding: velocities of a fall of friction of which nothing shows there."""
+"""Of the slowest certain sliding: velocities of a fall of which a tenth at most is left there (exp(-1/0.6²) = 6 %)."""
 MOST_VISCOUS = 9.0
 """Times the viscous friction found, where the record does not tell it."""
 GIVEN = 0.1
@@ -218,19 +218,20 @@ def _falling(model: Model, found: Identified, rng: np.random.Generator) -> Model
     if model.law.name != "coulomb":
         return model
     own: Any = model.parameters
+    levels = [float(getattr(own, f"fc{way}")) for way in _ways(model)]
     if fall > 0.0:
-        return _with_fall(model, fall, found.misfit["fall_missing_velocity"])
+        return _with_fall(model, [fall] * len(levels), found.misfit["fall_missing_velocity"])
     if not slowest > 0.0:
         return model
-    rest = (MOST_STATIC - 1.0) * float(rng.uniform()) * float(own.fc)
-    return _with_fall(model, rest, slowest * _between(rng, *HIDDEN))
+    more = (MOST_STATIC - 1.0) * float(rng.uniform())
+    return _with_fall(model, [more * level for level in levels], slowest * _between(rng, *HIDDEN))
 
 
-def _with_fall(model: Model, fall: float, vs: float) -> Model:
-    """Coulomb's law with so much more friction at rest, N·m, that falls with a velocity, rad/s."""
+def _with_fall(model: Model, falls: Sequence[float], vs: float) -> Model:
+    """Coulomb's law with so much more friction at rest in each direction, N·m, that falls with a velocity, rad/s."""
     own: Any = model.parameters
     curve: dict[str, Any] = {}
-    for way in _ways(model):
+    for way, fall in zip(_ways(model), falls, strict=True):
         level = float(getattr(own, f"fc{way}"))
         curve |= {f"fs{way}": level + fall, f"fc{way}": level, f"vs{way}": vs}
         curve[f"sigma2{way}"] = float(getattr(own, f"sigma2{way}"))

@@ -84,8 +84,9 @@ class Recommendation:
 
     @property
     def usual_reduction(self) -> float:
-        """The part of the error that is taken away on half of the axes that the setting was not picked on."""
-        return 1.0 - median(self.chosen.errors[1:]) if self.chosen and self.confirmed_on else 0.0
+        """The part of the error that is taken away at least on half of the axes that the setting was not picked on; NaN
+        where it was confirmed on none."""
+        return 1.0 - median(self.chosen.errors[1:]) if self.chosen and self.confirmed_on else math.nan
 
     @property
     def confirmed_on(self) -> int:
@@ -105,7 +106,7 @@ class Recommendation:
             "model": self.model.as_dict() if self.model else None, "gains": self.gains,
             "linear_error_rms": self.linear_error, "margin": self.margin, "unsafe_gain": self.unsafe_gain,
             "reduction": list(self.reduction) if self.chosen else None, "reduction_confidence": self.confidence,
-            "usual_reduction": self.usual_reduction if self.chosen else None,
+            "usual_reduction": self.usual_reduction if self.confirmed_on else None,
             "axes": self.axes, "axes_confirmed": self.confirmed_on, "notes": list(self.notes),
             "linear_alone_rings": self.rings, "drive": self.drive.as_dict(),
             "candidates": [c.as_dict() for c in self.candidates],

@@ -32,6 +32,8 @@ MOTIONS = {
     "presliding": "slow ramps of the torque to and fro, below break-away", "stickslip": "slow constant speeds",
 }  # fmt: skip
 """What it moves, for a drive that does it in a program of its own."""
+SAME = 2e-3
+"""Part of a count that the step in a log, of differences of rounded positions, may be off."""
 FINEST = 1e-8
 """m: finer steps are those of printed digits."""
 BY_A_RIG = "stickslip rig run "
@@ -135,9 +137,10 @@ def is_linear(records: Sequence[Record]) -> bool:
 def counts_of(record: Record) -> int:
     """Counts of the encoder a revolution (of a linear axis, in 2π m), where its step shows; else 0.
 
-    It must be an encoder's: a power of 2 or some thousands a revolution, or a length of two digits.
+    It must be an encoder's: a power of 2 or some thousands a revolution, or a length of two digits that is no power of
+    ten, which printed digits have as well.
     """
-    if "position" not in record.channels:
+    if record.units.get("position") not in ("rad", "m") or "position" not in record.channels:
         return 0
     try:
         step = encoder_step(record["position"])
@@ -148,9 +151,11 @@ def counts_of(record: Record) -> int:
     counts = 2.0 * math.pi / step
     if is_linear([record]):
         near = float(f"{step:.2g}")
-        return round(2.0 * math.pi / near) if step > FINEST and abs(step - near) < 2e-3 * near else 0
+        printed = near == float(f"1e{math.floor(math.log10(near) + 0.5)}")
+        scale = step > FINEST and not printed and abs(step - near) < SAME * near
+        return round(2.0 * math.pi / near) if scale else 0
     for near in (2 ** round(math.log2(counts)), 1000 * round(counts / 1000.0)):
-        if near and counts < 1e6 and abs(counts - near) < 2e-3 * near:
+        if near and counts < 1e6 and abs(counts - near) < SAME * near:
             return int(near)
     return 0
 

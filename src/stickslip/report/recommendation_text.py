@@ -106,7 +106,7 @@ def reduction(result: Recommendation) -> str:
         return f"{best} on the best estimate; no interval"
     usual = percent(result.usual_reduction, result.usual_reduction)
     return (
-        f"{best} on the best estimate, {usual} on half of the sampled axes; "
+        f"{best} on the best estimate, at least {usual} on half of the sampled axes; "
         f"{100.0 * result.confidence:.0f} % interval {percent(*result.reduction)}, "
         f"safe on all {result.confirmed_on} sampled axes (Monte Carlo)"
         + (", but for the linear controller's own oscillation" if result.rings else "")

@@ -261,7 +261,7 @@ def finished(
 ) -> ExportResult:
     """The export, in the units of a linear axis where the source's is one, and tried where that is asked for."""
     linear = is_linear(content.values)
-    files = along_a_line(files, chosen.name) if linear else files
+    files = along_a_line(files, chosen.name, name) if linear else files
     found = attempt(files) if attempt else None
     return ExportResult(chosen, name, files.files, files.notes, tried(found) if linear else found)
 

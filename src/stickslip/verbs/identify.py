@@ -375,7 +375,8 @@ def weight_notes(found: Identification, records: Sequence[Record]) -> list[str]:
     if geared:
         return [f"{geared[0]}."]
     mechanics: Any = found.details.get("mechanics")
-    if mechanics is None or not mechanics.gravity:
+    told = {e.name for e in found.estimates if e.identified}
+    if mechanics is None or not {"gravity", "gravity_angle"} <= told:
         return []
     phase = math.remainder(0.5 * math.pi - mechanics.gravity_angle, math.tau)
     return [

@@ -50,7 +50,7 @@ HELD_BY_FRICTION = (
 )
 WORSE = 2.0
 """Times the force error of plain least squares from which on a model that leaves more torque than there is tells
-nothing."""
+nothing: of little but standstills both leave as much. Of another program's logs one was ten times worse."""
 EXPLAINS_NOTHING = (
     "the model leaves {own:.0%} of the torque over the whole record, plain least squares {plain:.0%}: it does not "
     "describe this axis"
@@ -111,7 +111,7 @@ def explaining(estimates: Sequence[Estimate], misfit: Mapping[str, float]) -> tu
     """The estimates, none of them identified where the model leaves more of the torque than there is, and plain least
     squares less than half as much."""
     own, plain = misfit.get("force_relative", 0.0), misfit.get("inverse_dynamics_relative", math.inf)
-    if not own > max(1.0, WORSE * plain):
+    if not (math.isfinite(plain) and own > max(1.0, WORSE * plain)):
         return tuple(estimates)
     why = EXPLAINS_NOTHING.format(own=own, plain=plain)
     return tuple(replace(e, identified=False, verdict=why) if e.identified else e for e in estimates)

@@ -21,7 +21,7 @@ from stickslip.identify.compare.levels import (
     unseen,
 )
 from stickslip.identify.compare.motor_or_load import on_one_side
-from stickslip.identify.compare.same_turn import ANGLE, in_one_turn
+from stickslip.identify.compare.same_turn import ANGLE, in_one_turn, without_angle
 from stickslip.identify.compare.text import lines
 from stickslip.identify.estimate import Estimate, Picture, Trace
 from stickslip.identify.identified_file import Identified, covariance
@@ -137,8 +137,9 @@ def compare_models(
             )
     if first.motion != second.motion:
         raise InputError(f"{first.path} is a {first.motion} axis and {second.path} a {second.motion} one")
-    # A record's own turn is one of the shaft that it counts, before a gear.
-    second, moved = on_one_side(first, in_one_turn(first, second))
+    # Of a load that turns a part of the motor's turns, whole turns of either are not whole turns of the other.
+    second, moved = on_one_side(first, second)
+    second = without_angle(second) if moved else in_one_turn(first, second)
     changes, p, notes = compared_parameters(first, second)
     notes = [moved, *notes] if moved else notes
     hashes = {str(d.get("sha256", "")) for d in first.data} & {str(d.get("sha256", "")) for d in second.data}
@@ -150,7 +151,7 @@ def compare_models(
     levels = levels_of(first, second, low, float(velocity[-1]))
     difference, band, curve_p, sides = compared_curves(first, second, velocity, 1.0 - 0.5 * level)
     own = {f.name for m in (first, second) for f in m.model.law.fields}
-    single = min((c.p for c in changes if c.of(own) and not math.isnan(p)), default=1.0)
+    single = min((c.p for c in changes if c.of(own) and not math.isnan(p + c.p)), default=1.0)
     changed = bool(np.any(np.abs(difference) > band)) or min(p, single) < 0.25 * level
     # What the tests together do not bear out is not called changed one by one.
     changes = tuple(replace(c, decides=changed) if c.of(own) else c for c in changes)

@@ -162,7 +162,7 @@ def unseen(changes: Sequence[Change], levels: Sequence[Change]) -> tuple[str, ..
     """What could not have been seen: for each number that did not change, how large a change goes unseen."""
     parts: list[str] = []
     for c in (*changes, *levels):
-        if c.changed or c.differs or c.told:
+        if c.differs or c.told:
             continue
         half = 0.5 * (c.upper - c.lower)
         size = f"{100.0 * half / abs(c.first):.2g} %" if c.first else f"{half:.2g} {c.unit}"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from stickslip.identify.identified_file import Identified
 
 ANGLE = "gravity_angle"
@@ -22,3 +24,14 @@ def in_one_turn(first: Identified, second: Identified) -> Identified:
         for e in second.estimates
     )
     return replace(second, estimates=estimates)
+
+
+def without_angle(found: Identified) -> Identified:
+    """The model without that angle: brought through a gear, it has whole turns of another shaft."""
+    kept = [k for k, e in enumerate(found.estimates) if e.name != ANGLE]
+    correlation = (
+        found.correlation[np.ix_(kept, kept)]
+        if len(found.correlation) == len(found.estimates)
+        else found.correlation
+    )
+    return replace(found, estimates=tuple(found.estimates[k] for k in kept), correlation=correlation)

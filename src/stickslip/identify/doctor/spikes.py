@@ -5,6 +5,7 @@ A torque that accelerates the axis sticks out, too: where the velocity changes w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -67,12 +68,23 @@ def _size_of(values: Array, index: Any, unit: str) -> str:
     """How many spikes there are, and how large beside what is usual; beside their neighbours where they are less."""
     usual = float(np.percentile(np.abs(np.delete(values, index)), 98))
     largest = float(values[index[np.argmax(np.abs(values[index]))]])
-    many = "1 spike" if index.size == 1 else f"{index.size} spikes"
+    runs = np.split(index, np.flatnonzero(np.diff(index) > 1) + 1)
+    many = "1 spike" if len(runs) == 1 else f"{len(runs)} spikes"
     if abs(largest) > usual:
         return f"{many} of up to {largest:.4g} {unit}, where {usual:.4g} is usual"
-    before, after = np.maximum(index - 1, 0), np.minimum(index + 1, values.size - 1)
-    apart = np.minimum(np.abs(values[index] - values[before]), np.abs(values[index] - values[after]))
-    return f"{many}, up to {float(np.max(apart)):.4g} {unit} away from the rows before and after"
+    apart = max(_away(values, run) for run in runs)
+    return f"{many}, up to {apart:.4g} {unit} away from the rows before and after"
+
+
+def _away(values: Array, run: Any) -> float:
+    """How far a spike sticks out of the nearer one of the usable rows before and after it."""
+    before, after = int(run[0]) - 1, int(run[-1]) + 1
+    while before >= 0 and not math.isfinite(values[before]):
+        before -= 1
+    while after < values.size and not math.isfinite(values[after]):
+        after += 1
+    beside = [values[k] for k in (before, after) if 0 <= k < values.size]
+    return float(np.max(np.min(np.abs(values[run][:, None] - np.array(beside)), axis=1)))
 
 
 def spike_rows(record: Record) -> Any:

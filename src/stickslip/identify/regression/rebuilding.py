@@ -25,7 +25,7 @@ def rebuilding_way(records: Sequence[SlidingRows], skew: float) -> float:
     """Way after a reversal or stop over which friction is still being built up again, rad (m).
 
     Pre-sliding, play and wind-up all leave friction below its level there, whatever their law. Both directions are
-    left. Of a pendulum the weight lacks as well, so that more is left out: where it turns, a coarse position says least.
+    left. Of a pendulum the weight lacks, too, so that more is left out: where it turns, a coarse position says least.
     """
     fixed, gone = stacked(records, "fixed"), stacked(records, "gone")
     most = [
