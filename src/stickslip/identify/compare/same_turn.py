@@ -29,9 +29,5 @@ def in_one_turn(first: Identified, second: Identified) -> Identified:
 def without_angle(found: Identified) -> Identified:
     """The model without that angle: brought through a gear, it has whole turns of another shaft."""
     kept = [k for k, e in enumerate(found.estimates) if e.name != ANGLE]
-    correlation = (
-        found.correlation[np.ix_(kept, kept)]
-        if len(found.correlation) == len(found.estimates)
-        else found.correlation
-    )
+    correlation = found.correlation[np.ix_(kept, kept)]
     return replace(found, estimates=tuple(found.estimates[k] for k in kept), correlation=correlation)
