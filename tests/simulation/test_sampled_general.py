@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import stickslip as ss
 from stickslip import plugins
 from stickslip.simulation.case_arrays import DONE
 from stickslip.simulation.sampled import engine as sampled
-from support.sampled_loops import CONTROLLERS, FAST, TIME, J, apart, case_of, on_grid
+from support.sampled_loops import CONTROLLERS, FAST, TIME, J, apart, case_of, on_grid, up_to_a_turn
 
 
 def rests_or_slides(torques, law, p):
@@ -28,16 +27,7 @@ def rests_or_slides(torques, law, p):
             def rate(_, y, u=u, side=side):
                 return [y[1], (u - law.steady(side * max(side * y[1], 1e-12), p)) / J]
 
-            def turned(_, y, side=side):
-                return side * y[1] if abs(y[1]) > 1e-13 else 1e-13
-
-            turned.terminal, turned.direction = True, -1
-            run = solve_ivp(
-                rate, (t, TIME), y, "DOP853", rtol=1e-12, atol=1e-14, events=turned, max_step=1e-4
-            )
-            t, y = run.t[-1], run.y[:, -1]
-            if run.status == 1:
-                y[1] = 0.0
+            t, y = up_to_a_turn(rate, t, y, side)
         velocity = y[1]
         out.append(y[0])
     return np.array(out)

@@ -88,6 +88,20 @@ def apart(one, other):
     return np.abs(on_grid(one)[:, 3] - on_grid(other)[:, 3]).max()
 
 
+def up_to_a_turn(rate, t, y, side):
+    """Time and state by DOP853 at the end of a sample, or where the velocity y[1], of that sign, falls to 0."""
+
+    def turned(_, y):
+        return side * y[1] if abs(y[1]) > 1e-13 else 1e-13
+
+    turned.terminal, turned.direction = True, -1
+    run = solve_ivp(rate, (t, TIME), y, "DOP853", rtol=1e-12, atol=1e-14, events=turned, max_step=1e-4)
+    end = run.y[:, -1]
+    if run.status == 1:
+        end[1] = 0.0
+    return run.t[-1], end
+
+
 def moved_by(torques, contact):
     """Positions at every sample under held torques, by DOP853 stopped at every reversal.
 
@@ -103,16 +117,7 @@ def moved_by(torques, contact):
                 friction, dz = contact(y[1], y[2], side)
                 return [y[1], (u - friction) / J, dz]
 
-            def turned(_, y, side=side):
-                return side * y[1] if abs(y[1]) > 1e-13 else 1e-13
-
-            turned.terminal, turned.direction = True, -1
-            run = solve_ivp(
-                rate, (t, TIME), y, "DOP853", rtol=1e-12, atol=1e-14, events=turned, max_step=1e-4
-            )
-            t, y = run.t[-1], run.y[:, -1]
-            if run.status == 1:
-                y[1] = 0.0
+            t, y = up_to_a_turn(rate, t, y, side)
         _, velocity, z = y
         out.append(y[0])
     return np.array(out)

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 from stickslip.export.job import Check, Export
-from stickslip.identify.on_a_line import words
+from stickslip.identify.on_a_line import UNITS, words
 
 WORDED = ("c99", "arduino", "python", "matlab", "st", "linuxcnc")
 """Targets whose files have units in comments and words alone: others declare units that simulators compute with."""
 TURN = "the axis is linear: a turn in these files stands for 2π m"
 VECTORS = ".csv"
 """Golden vectors keep the names of their columns, by which programs find them."""
-UNITS = re.compile(r"(?<![A-Za-z0-9_.])([mµk]?)(N[·*]m|kg[·*]m(?:²|\^2)|rad)(?![A-Za-z0-9_]|\.[A-Za-z])")
-"""A unit in a comment, also in ASCII's letters; not a part of an identifier or of a file's name."""
-LINEAR = {"N": "N", "k": "kg", "r": "m"}
 
 
 def is_linear(content: Mapping[str, object]) -> bool:
@@ -43,4 +39,4 @@ def tried(check: Check | None) -> Check | None:
 def _text(name: str, content: str | bytes) -> str | bytes:
     if isinstance(content, bytes) or name.endswith(VECTORS):
         return content
-    return UNITS.sub(lambda found: found[1] + LINEAR[found[2][0]], content)
+    return words(content)

@@ -11,8 +11,11 @@ from stickslip.identify.estimate import Identification, Picture
 from stickslip.machines.servo import ServoAxis
 
 LINEAR = ServoAxis(motion="linear")
-UNITS = re.compile(r"(?<![^\W\d_])([mµk]?)(N·m|kg·m²|rad)(?![^\W\d_])")
-"""A unit in a sentence or a label, perhaps with a prefix, between other signs than letters."""
+UNITS = re.compile(r"(?<![A-Za-z0-9_.])([mµk]?)(N[·*]m|kg[·*]m(?:²|\^2)|rad)(?![A-Za-z0-9_]|\.[A-Za-z])")
+"""A unit in a sentence, a label or a comment, perhaps with a prefix, also in ASCII's letters; no part of an identifier
+or of a file's name."""
+ALONG = {"N": "N", "k": "kg", "r": "m"}
+"""What it is along a line, by its first letter."""
 
 
 def along_a_line(found: Identification) -> Identification:
@@ -46,7 +49,7 @@ def in_newtons(numbers: Mapping[str, Any]) -> dict[str, Any]:
 
 def words(text: str) -> str:
     """A sentence or a label."""
-    return UNITS.sub(lambda found: found[1] + LINEAR.unit(found[2]), text)
+    return UNITS.sub(lambda found: found[1] + ALONG[found[2][0]], text)
 
 
 def picture(p: Picture) -> Picture:
