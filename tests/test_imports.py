@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -12,16 +13,27 @@ import stickslip
 ROOT = Path(stickslip.__file__).parent
 
 
+@cache
+def tree_of(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+def called(node: ast.expr) -> str:
+    """What a name ends with: `import_module` of `importlib.import_module`."""
+    return node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
+
+
 def for_types_only(node: ast.AST) -> bool:
-    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    return isinstance(node, ast.If) and called(node.test) == "TYPE_CHECKING"
 
 
 def nodes(tree: ast.AST) -> Iterator[ast.AST]:
     """All nodes but those that only a type checker runs."""
-    for child in ast.iter_child_nodes(tree):
-        if not for_types_only(child):
-            yield child
-            yield from nodes(child)
+    left = [tree]
+    while left:
+        children = [node for node in ast.iter_child_nodes(left.pop()) if not for_types_only(node)]
+        left += children
+        yield from children
 
 
 def named(node: ast.AST) -> list[str]:
@@ -31,7 +43,7 @@ def named(node: ast.AST) -> list[str]:
         return [f"stickslip.{alias.name}" for alias in node.names] if whole else [node.module]
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
-    if isinstance(node, ast.Call) and node.args and ast.unparse(node.func).endswith("import_module"):
+    if isinstance(node, ast.Call) and node.args and called(node.func) == "import_module":
         first = node.args[0]
         if isinstance(first, ast.JoinedStr):
             first = first.values[0]
@@ -45,15 +57,14 @@ def part(module: str) -> str:
     return module.split(".")[1] if module.startswith("stickslip.") else ""
 
 
+@cache
 def imports() -> dict[str, set[str]]:
     parts: dict[str, set[str]] = {}
     for file in ROOT.rglob("*.py"):
         mine = part(".".join(("stickslip", *file.relative_to(ROOT).with_suffix("").parts)))
         if mine == "__init__" or file.name.startswith("template"):
             continue
-        found = {
-            part(name) for node in nodes(ast.parse(file.read_text(encoding="utf-8"))) for name in named(node)
-        }
+        found = {part(name) for node in nodes(tree_of(file)) for name in named(node)}
         parts.setdefault(mine, set()).update(found - {mine, "", "__version__"})
     return parts
 
@@ -70,7 +81,7 @@ def taken_from_other_rooms() -> list[str]:
     found: list[str] = []
     for file in ROOT.rglob("*.py"):
         mine = ".".join(("stickslip", *file.relative_to(ROOT).parent.parts))
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree_of(file)):
             names = named(node)
             if isinstance(node, ast.ImportFrom) and node.module:
                 names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]

@@ -196,6 +196,9 @@ def test_a_law_keeps_its_colour_and_strangers_differ() -> None:
     assert style_of("FF-gms") == style_of("FB-gms") == style_of("gms")
     names = ["a", "b", "PD", "c"]
     assert len({style_of(n, names) for n in names}) == 4
+    # Beside PD and PID a spare colour is none of theirs.
+    beside = ["PD", "PID", "FF", "MINE", "THIRD"]
+    assert len({style_of(n, beside).colour for n in beside}) == 5
 
 
 def test_importing_the_report_loads_no_matplotlib() -> None:

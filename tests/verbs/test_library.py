@@ -145,6 +145,10 @@ def test_units_of_arrays_are_converted_and_named(signals: dict[str, np.ndarray])
         ({"t": [0.0], "position": [0.0], "units": {"position": "furlong"}}, "is not a unit that is known"),
         ({"t": [0.0], "position": [0.0], "map": {"position": "q"}}, "map applies to columns"),
         ({"tork": [0.0]}, "did you mean 'torque'"),
+        (
+            {"t": [0.0, 1e-3], "position": [0.0, 0.1], "sample_time": 5e-4},
+            "t and sample_time = 0.0005 exclude each",
+        ),
     ],
 )
 def test_bad_arrays_are_refused_in_one_line(given: dict[str, object], said: str) -> None:
@@ -160,6 +164,18 @@ def test_two_logs_in_one_call_and_columns_of_a_record_are_refused(signals: dict[
         ss.read(record, map={"position": "q"})
     with pytest.raises(ss.InputError, match="without columns of numbers"):
         ss.read(object())
+    with pytest.raises(ss.InputError, match=r"no column names; give the signals by name: t="):
+        ss.read(signals["t"])
+    with pytest.raises(ss.InputError, match=re.escape('map={"position": "Pos(deg)"}: the file has no')):
+        ss.read({"t": signals["t"], "Pos (deg)": signals["position"]}, map={"position": "Pos(deg)"})
+
+
+def test_a_rate_that_a_column_of_times_contradicts_is_said(signals: dict[str, np.ndarray]) -> None:
+    columns = {"time [s]": signals["t"], "position [rad]": signals["position"]}
+    step = float(np.median(np.diff(signals["t"])))
+    assert "time-overruled" not in {f.code for f in ss.doctor(columns, sample_time=step).findings}
+    found = {f.code: f for f in ss.doctor(columns, sample_time=0.5 * step).findings}
+    assert f"{step:g} s apart" in found["time-overruled"].message
 
 
 def test_the_doctor_says_the_same_from_python(

@@ -117,6 +117,11 @@ def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list
     return [chosen[role] for role in ROLES if role in chosen], findings
 
 
+def _as_said(role: str, text: str) -> str:
+    """An option ``--map``, in quotes where a shell asks for them."""
+    return f"--map {role}={text}" if re.fullmatch(r"[\w.:·%/@-]+", text) else f"--map '{role}={text}'"
+
+
 def _explicit(table: Table, role: str, text: str) -> Choice:
     """What the user says: COLUMN, COLUMN:UNIT, with @load or @motor behind."""
     side = ""
@@ -128,7 +133,7 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
     column = _find(table, name)
     if column is None:
         raise InputError(
-            f"--map {role}={text}: the file has no column {name!r}; {suggestion(name, _names_of(table))}"
+            f"{_as_said(role, text)}: the file has no column {name!r}; {suggestion(name, _names_of(table))}"
         )
     if unit:
         parsed = None if unit.lower() in AMBIGUOUS else parse_unit(unit)
@@ -141,7 +146,7 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
                 if current
                 else f"{role} takes {spellings(KINDS[role])}"
             )
-            raise InputError(f"--map {role}={text}: {unit!r} {what}; {remedy}")
+            raise InputError(f"{_as_said(role, text)}: {unit!r} {what}; {remedy}")
         return Choice(role, column.name, unit, "map", side)
     read = role_of(column.name, _unit_of(column))
     guess = _guessed(role, column, read)

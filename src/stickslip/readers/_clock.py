@@ -37,6 +37,9 @@ RATES = (
     "f_s",
 )
 
+SAME = 0.01
+"""Part of a stated period by which a column of times may differ from it without a word."""
+
 
 def time_of(
     table: Table, by_role: dict[str, Choice], columns: dict[str, Column], sample_time: float | None
@@ -56,7 +59,8 @@ def time_of(
             raise InputError(f"sample_time = {sample_time:g} must be greater than 0 s")
         if first is None:
             raise InputError("no column is known to be a channel; say which with --map position=COLUMN:UNIT")
-        by_role.pop("time", None)
+        if (choice := by_role.pop("time", None)) is not None:
+            found += _overruled(choice, columns[choice.column].values, sample_time)
         return np.arange(first.values.size, dtype=np.float64) * sample_time, 0.0, found
     if "time" in by_role:
         choice = by_role["time"]
@@ -117,6 +121,24 @@ def times_of(table: Table, choices: Sequence[Choice], sample_time: float | None)
 def _some(table: Table) -> str:
     names = [c.name or "one without a name" for c in table.columns]
     return ", ".join(names[:12]) + (", ..." if len(names) > 12 else "") if names else "none at all"
+
+
+def _overruled(choice: Choice, time: Array, sample_time: float) -> list[Finding]:
+    """That a stated rate takes the place of a column of times that says another; nothing where both say the same, or
+    the column's unit is not known (a counter)."""
+    unit, steps = parse_unit(choice.unit), np.diff(time[np.isfinite(time)])
+    if unit is None or not steps.size:
+        return []
+    own = unit.factor * float(np.median(steps))
+    if abs(own - sample_time) <= SAME * sample_time:
+        return []
+    said = (
+        f"sample_time = {sample_time:g} s takes the place of the column of times {choice.column!r}, whose rows are "
+        f"{own:g} s apart"
+    )
+    return [
+        Finding("warning", "time-overruled", said, remedy="leave --sample-time out if the column is right")
+    ]
 
 
 def _epoch(time: Array) -> float:

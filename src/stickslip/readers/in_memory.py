@@ -94,6 +94,11 @@ def table_in_memory(data: Any) -> Table:
     InputError
         If it holds no columns of numbers.
     """
+    if getattr(data, "ndim", 0) == 1 and getattr(getattr(data, "dtype", None), "names", None) is None:
+        raise InputError(
+            f"log: an array of {len(data)} numbers has no column names; give the signals by name: t=..., "
+            "position=..., torque=..."
+        )
     tree = data
     if hasattr(data, "columns") and hasattr(data, "to_numpy"):
         tree = {str(name): data[name].to_numpy() for name in data.columns}

@@ -79,14 +79,19 @@ SPARE = (
 
 
 def style_of(name: str, others: Sequence[str] = ()) -> Style:
-    """The style of a controller or law by its name; one of the spare ones by its place among unknown names."""
-    law = name.rpartition("-")[2]
-    known = LINEAR.get(name) or LAWS.get(law)
-    if known:
+    """The style of a controller or law by its name; of an unknown one a spare by its place among the unknown names,
+    first those in colours that no known name beside it has."""
+    if known := _known_style(name):
         return known
-    strangers = [n for n in others if n not in LINEAR and n.rpartition("-")[2] not in LAWS]
-    place = strangers.index(name) if name in strangers else 0
-    return SPARE[place % len(SPARE)]
+    strangers = [n for n in others if not _known_style(n)]
+    taken = {style.colour for n in others if (style := _known_style(n))}
+    free = sorted(SPARE, key=lambda style: style.colour in taken)
+    return free[strangers.index(name) % len(free) if name in strangers else 0]
+
+
+def _known_style(name: str) -> Style | None:
+    """Of a linear controller, or of the law that a name ends with."""
+    return LINEAR.get(name) or LAWS.get(name.rpartition("-")[2])
 
 
 @dataclass(frozen=True)

@@ -209,6 +209,11 @@ def _of_signals(signals: Mapping[str, ArrayLike], reading: Reading) -> Record:
     for name in ("map", "profile", "beside"):
         if reading.get(name):
             raise InputError(f"{name} applies to columns of files and frames, not to arrays; leave it out")
+    if "time" in signals and (period := reading.get("sample_time")) is not None:
+        raise InputError(
+            f"t and sample_time = {period:g} exclude each other, since both say when the rows were taken; give one of "
+            "them"
+        )
     units = {SHORT.get(n, n): unit for n, unit in reading.get("units", {}).items()}
     table, mapping = table_of_signals(signals, units, {channel: n for n, channel in SHORT.items()})
     record = record_of(table, mapping, drive=_drive(reading), sample_time=reading.get("sample_time"))

@@ -25,6 +25,7 @@ from stickslip.identify.axis.falling import (
     with_timing,
     within_sliding,
 )
+from stickslip.identify.axis.form import of_sliding_form
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.axis.settled import ALONE, APART, TWO_METHODS
 from stickslip.identify.estimate import Estimate
@@ -36,6 +37,7 @@ from stickslip.identify.regression.regression import QUANTILE, Regression, regre
 from stickslip.identify.regression.regressions import Regress
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
+from stickslip.spec import Law
 
 ALIGNED = 0.1
 """Rows by which a torque that acts from row to row must be off its row to be moved."""
@@ -44,9 +46,6 @@ KNOWN = 0.5
 AS_GOOD = 1.5
 """Times as much as the regression leaves of the torque in certain sliding, that other values may leave and still
 stand."""
-TOLD_BY_SLIDING = (
-    "inertia", "offset", "gravity", "gravity_angle", "fc", "sigma2", f"fc{NEGATIVE}", f"sigma2{NEGATIVE}",
-)  # fmt: skip
 DOUBT = "the prediction error, the only evidence for it, contradicts certain sliding on {name}: {other} against {own}"
 
 ONE_BAND = (
@@ -144,10 +143,13 @@ def on_creep(found: Regression | None, axis: ServoAxis) -> list[str]:
 # ---- numbers --------------------------------------------------------------------------------------------------
 
 
-def sliding_values(found: Regression) -> dict[str, tuple[float, float, float]]:
-    """Value and ends of the 95 % interval of every number that certain sliding tells, by the names of estimates."""
+def sliding_values(found: Regression, law: Law | None) -> dict[str, tuple[float, float, float]]:
+    """Value and ends of the 95 % interval of every number that certain sliding tells, by the names of estimates; none
+    of friction where the law means others by these names."""
     own = {n: n for n in ("inertia", "offset", "fc", "sigma2")}
-    if found.each_way:
+    if law is not None and not of_sliding_form(law):
+        own = {"inertia": "inertia"} if found.each_way else {n: n for n in ("inertia", "offset")}
+    elif found.each_way:
         own = {
             "inertia": "inertia", **{n: f"{n}_positive" for n in ("fc", "sigma2")},
             **{n + NEGATIVE: f"{n}_negative" for n in ("fc", "sigma2")},
@@ -183,9 +185,10 @@ def agreed(
     fine : bool
         Whether the prediction error was asked.
     """
-    sliding, parameters = sliding_values(found), {p.name: p for p in vector.free}
+    law = vector.base.law if vector.base is not None else None
+    sliding, parameters = sliding_values(found, law), {p.name: p for p in vector.free}
     held, estimates = known_to_act(found), list(estimates)
-    taken, notes, doubts = of_sliding(estimates, found, parameters, inverse, scale, fine)
+    taken, notes, doubts = of_sliding(estimates, found, sliding, parameters, inverse, scale, fine)
     if doubts:
         # Where both disagree on what both can tell, neither value nor interval of the fine one is to be trusted.
         taken |= {
@@ -193,7 +196,7 @@ def agreed(
             for e in estimates if taken.get(e.name) is e
         }  # fmt: skip
         notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
-    for e in estimates if fine else ():
+    for e in estimates if fine and (law is None or of_sliding_form(law)) else ():
         if e.name.removesuffix(NEGATIVE) not in FALL or e.name not in parameters:
             continue
         if found.each_way:
@@ -228,12 +231,12 @@ def known_to_act(found: Regression) -> bool:
 
 
 def of_sliding(
-    estimates: Iterable[Estimate], found: Regression, parameters: Mapping[str, Parameter],
-    inverse: InverseDynamics | None, scale: Mapping[str, float], fine: bool,
+    estimates: Iterable[Estimate], found: Regression, sliding: Mapping[str, tuple[float, float, float]],
+    parameters: Mapping[str, Parameter], inverse: InverseDynamics | None, scale: Mapping[str, float], fine: bool,
 ) -> tuple[dict[str, Estimate], list[str], str]:  # fmt: skip
     """What certain sliding tells, by name, what is to be said, and why the prediction error is to be doubted, where it
-    contradicts that; arguments as in `agreed`."""
-    sliding, held = sliding_values(found), known_to_act(found)
+    contradicts that; arguments as in `agreed`, and `sliding_values`."""
+    held = known_to_act(found)
     stands = inverse is not None and as_good(inverse, found)
     taken: dict[str, Estimate] = {}
     notes: list[str] = []
@@ -264,17 +267,20 @@ def of_sliding(
     return taken, notes, doubts
 
 
-def told_apart(estimates: Iterable[Estimate], found: Regression) -> tuple[Estimate, ...]:
+def told_apart(estimates: Iterable[Estimate], found: Regression, law: Law) -> tuple[Estimate, ...]:
     """The estimates, inertia, level and slope of friction not identified where certain sliding does not tell them
     apart; values stay.
 
     One band of frequencies alone tells inertia or level (on tuning steps 8 of 19 such levels held, 17 of 26 inertias),
     or the slope where motor and load move apart; the level is extrapolated, or its value had to be moved far towards
-    another method's.
+    another method's. A law that means others by these names has its friction from the prediction error.
     """
+    of_law = of_sliding_form(law)
     (low, high), own = found.interval("fc"), found.numbers["fc"].value
     # What sliding hardly tells is the prediction error's.
-    clear = {"inertia": True, "fc": high <= RATIO * low, "sigma2": found.slope_told}
+    clear = {
+        "inertia": True, "fc": of_law and high <= RATIO * low, "sigma2": of_law and found.slope_told,
+    }  # fmt: skip
 
     def doubt_on(e: Estimate) -> str:
         name = e.name.removesuffix(NEGATIVE)

@@ -17,7 +17,6 @@ from typing import Any
 from stickslip import plugins
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis.agreed import (
-    TOLD_BY_SLIDING,
     aligned,
     on_creep,
     on_timing,
@@ -26,6 +25,7 @@ from stickslip.identify.axis.agreed import (
 )
 from stickslip.identify.axis.choice import Candidate, asked_of, chosen_of, compared, foreseen, sentence_on
 from stickslip.identify.axis.exponent import is_open, shown
+from stickslip.identify.axis.form import TOLD_BY_SLIDING, never_falls
 from stickslip.identify.axis.law_fit import Evidence, against_sliding, estimated
 from stickslip.identify.axis.output import judged
 from stickslip.identify.axis.result import assembled, narrow_note, noted
@@ -52,6 +52,9 @@ SIMPLEST = (
 CLOSER = (
     "Law '{simplest}' is given instead of '{law}', which leaves more of the torque than plain least squares "
     "do: of its additional parameters ({more}) the record does not determine all."
+)
+NOT_COMPARED = (
+    "Not compared, since friction falls with velocity where the axis slides, and theirs does not: {names}."
 )
 SLOWEST = 0.25
 """s between two samples, from which on a record says nothing of an axis's dynamics."""
@@ -146,7 +149,8 @@ def identify_axis(
         asked, more = shown(asked, evidence.sliding, tried)
         notes = [*notes, *more]
     if len(tried) > 1:
-        tried = shortlist(tried, evidence.sliding)
+        tried, more = shortlist(tried, evidence.sliding)
+        notes = notes if automatic else [*notes, *more]
     chosen, own = tried[0], asked_of(tried[0], asked, tried)
     if len(tried) > 1:
         candidates, by = judged_laws(evidence, tried, asked, intervals, progress)
@@ -261,14 +265,19 @@ def looked_at(
     return Evidence(experiments, validation, axis, inverse, sliding, unchecked), said
 
 
-def shortlist(laws: Sequence[Law], sliding: Regression | None) -> list[Law]:
-    """The laws worth a comparison, of several: only those with a fall of friction where one shows clearly.
+def shortlist(laws: Sequence[Law], sliding: Regression | None) -> tuple[list[Law], list[str]]:
+    """The laws worth a comparison, of several, and what is to be said of the others: those without a fall of friction
+    are left out where one shows clearly.
 
     Where none shows it may lie below the speeds of certain sliding.
     """
     if sliding is None or not sliding.shows_a_fall:
-        return list(laws)
-    return [law for law in laws if "fs" in {f.name for f in law.fields}] or list(laws)
+        return list(laws), []
+    level = [law for law in laws if never_falls(law)]
+    if not level or len(level) == len(laws):
+        return list(laws), []
+    names = ", ".join(law.name for law in level)
+    return [law for law in laws if law not in level], [NOT_COMPARED.format(names=names)]
 
 
 def nothing_more(found: Identification, given: Set[str]) -> bool:

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.identify.axis.agreed import (
-    TOLD_BY_SLIDING,
     agreed,
     as_good,
     held_against,
@@ -25,6 +24,7 @@ from stickslip.identify.axis.agreed import (
 from stickslip.identify.axis.choice import Candidate
 from stickslip.identify.axis.exponent import predicted_with, with_other
 from stickslip.identify.axis.falling import with_level
+from stickslip.identify.axis.form import TOLD_BY_SLIDING
 from stickslip.identify.axis.output import OutputError
 from stickslip.identify.axis.prediction import axis_prediction
 from stickslip.identify.axis.problem import Problem
@@ -118,7 +118,7 @@ def by_sliding(
     u = vector.coordinates(vector.named(vector.start) | {e.name: e.value for e in estimates})
     estimates = evident(estimates, vector, u, experiments, axis)
     estimates, more = beside_plain(estimates, model, inverse, sliding)
-    estimates = told_apart(estimates, sliding)
+    estimates = told_apart(estimates, sliding, law)
     u = vector.coordinates(vector.named(u) | {e.name: e.value for e in estimates})
     found = with_values(experiments, axis, law, vector, u, asked.extras)
     shown = [replace(e, unit=axis.unit(e.unit)) for e in estimates]
@@ -147,7 +147,7 @@ def beside_plain(
     """The estimates settled beside the plain inverse dynamics, as far as certain sliding does not refute it."""
     if as_good(inverse, sliding, ALIKE):
         return settled(estimates, model, inverse)
-    own = {n: (low, high) for n, (_, low, high) in sliding_values(sliding).items()}
+    own = {n: (low, high) for n, (_, low, high) in sliding_values(sliding, model.law).items()}
     # Refuted by less than half, it is still in the intervals of the estimates.
     both = {e.name: (e.lower, e.upper) for e in estimates} if as_good(inverse, sliding) else None
     return settled(estimates, model, inverse, own, both, falls=sliding.shows_a_fall)
@@ -248,5 +248,5 @@ def checked(result: PredictionError | Fitted, evidence: Evidence) -> tuple[tuple
     if inverse is not None:
         estimates, more = beside_plain(estimates, result.model, inverse, sliding)
         said = [*said, *more]
-    estimates = told_apart(estimates, sliding)
+    estimates = told_apart(estimates, sliding, result.model.law)
     return (estimates if known_to_act(sliding) else with_level(estimates)), said

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from stickslip.binding import NEGATIVE
-from stickslip.identify.axis.agreed import TOLD_BY_SLIDING
 from stickslip.identify.axis.choice import (
     Candidate,
 )  # fmt: skip
 from stickslip.identify.axis.falling import NOT_TOGETHER, number_of, with_rest
+from stickslip.identify.axis.form import TOLD_BY_SLIDING, of_sliding_form
 from stickslip.identify.axis.gravity import within_a_turn
 from stickslip.identify.axis.load_check import ADVICE, judged_load
 from stickslip.identify.axis.loop_check import doubted_loops
@@ -139,7 +139,7 @@ def left_where_it_slides(sliding: Regression, model: Model, mechanics: Mechanics
 
 def told_whole(law: Law) -> bool:
     """Whether certain sliding tells every parameter of a law."""
-    return {f.name for f in law.fields} <= set(TOLD_BY_SLIDING)
+    return {f.name for f in law.fields} <= set(TOLD_BY_SLIDING) and of_sliding_form(law)
 
 
 def evident(

@@ -49,9 +49,10 @@ def missing(view: View) -> Iterator[Finding]:
         where = row(int(bad[0]), view)
         message = f"{channel} has {bad.size} missing or infinite values ({100 * share:.3g} %)"
         if share > 0.2:
-            yield Finding(
-                "error", "nan", message, where, f"log it again, or leave it out with --map {channel}=none"
+            without = (
+                "" if channel in ("time", "position") else f", or leave it out with --map {channel}=none"
             )
+            yield Finding("error", "nan", message, where, f"log it again{without}")
         else:
             yield Finding("warning", "nan", message, where, "these rows are left out")
 
