@@ -57,7 +57,7 @@ def test_a_bang_bang_torque_does_not_tell_the_friction_of_the_pendulum_that_it_s
     """Its level came out as Coulomb friction, four times too high and sure to 2 %."""
     record = swung(pumped)
     found = looked_at(record)
-    value, low, high = sliding_values(found)["fc"]
+    value, low, high = sliding_values(found, None)["fc"]
     assert value > 3.0 * LEVEL
     assert high - low < 0.5 * value
     assert "neither the pendulum's inertia nor its weight" in found.doubt

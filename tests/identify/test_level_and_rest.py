@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from stickslip import plugins
 from stickslip.identify.axis.agreed import BAND_ALONE, told_apart
 from stickslip.identify.axis.falling import AT_REST, NO_LEVEL, widened, with_level, with_rest
 from stickslip.identify.axis.identify import identify_axis
@@ -32,6 +33,7 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Par
 
 AXIS = ServoAxis(drive_side="load")
+COULOMB = plugins.law("coulomb")
 
 
 def regressed(logs: Any, *cell: Any) -> tuple[Regression, dict[str, float]]:
@@ -97,7 +99,7 @@ def test_a_slope_that_one_band_alone_tells_beside_no_level_is_not_identified(log
     assert low > 10.0 * truth["sigma2"]
     assert high < 2.0 * low
     assert not found.confirmed("sigma2")
-    (judged,) = told_apart([estimate("sigma2", 0.5 * (low + high), low, high)], found)
+    (judged,) = told_apart([estimate("sigma2", 0.5 * (low + high), low, high)], found, COULOMB)
     assert not judged.identified
     assert judged.verdict == BAND_ALONE
 
@@ -152,10 +154,10 @@ def test_inertia_and_level_that_one_band_alone_tells_are_not_identified(logs: An
     found, truth = regressed(logs, 1030398, "actual", 1000, "pid", "steps", "flexible")
     assert not found.confirmed("inertia")
     value = 1.117 * truth["inertia"]
-    (judged,) = told_apart([estimate("inertia", value, 0.97 * value, 1.03 * value)], found)
+    (judged,) = told_apart([estimate("inertia", value, 0.97 * value, 1.03 * value)], found, COULOMB)
     assert judged.verdict == BAND_ALONE
     calm, _ = regressed(logs, 4, "held", 1000, "p-pi", "production", "clean")
-    (kept,) = told_apart([estimate("inertia", value, 0.97 * value, 1.03 * value)], calm)
+    (kept,) = told_apart([estimate("inertia", value, 0.97 * value, 1.03 * value)], calm, COULOMB)
     assert kept.identified
 
 

@@ -69,6 +69,26 @@ def test_orders_of_both_parts_and_the_axis_without_them() -> None:
     assert found.misfit["inverse_dynamics_relative"] < 0.3 * plain.misfit["inverse_dynamics_relative"]
 
 
+def test_long_strokes_at_constant_speeds_show_high_orders() -> None:
+    """Their rows show no swing of the velocity at these orders: no column for it, where two of zeros ended the fit."""
+    t = np.arange(0.0, 24.0, 1e-3)
+    ends = np.arange(0.0, 25.0, 3.0)
+    speeds = np.array([0.2, -0.2, 0.4, -0.4, 0.8, -0.8, 4.0, -4.0])
+    v = np.convolve(
+        np.pad(speeds[np.digitize(t, ends) - 1], 50, mode="edge"), np.hanning(101) / 50.0, "valid"
+    )
+    q, a = np.cumsum(v) * 1e-3, np.gradient(v, t)
+    rng = np.random.default_rng(3)
+    cogging = 0.7 * np.cos(60.0 * q) + 0.18 * np.cos(120.0 * q)
+    torque = 0.03 * a + 1.2 * np.sign(v) + 0.2 * v + cogging + 0.01 * rng.standard_normal(t.size)
+    found = ss.identify(
+        Record(t, {"position": q, "motor_torque": torque}, UNITS), position_map=True, inverse=True
+    )
+    for name, size in {"even[60]": 0.7, "even[120]": 0.18}.items():
+        assert found[name].lower < size < found[name].upper
+        assert found[name].value == pytest.approx(size, rel=0.1)
+
+
 @pytest.mark.parametrize(
     ("made", "why"),
     [

@@ -229,5 +229,6 @@ def orders_of(places: Places) -> Orders:
 
 def without_motion(places: Places, found: Fit, moving: Sequence[str]) -> Places:
     """Only levels and waves in the torque, as a picture over the angle shows them."""
-    carried = columns(places, (), moving)[:, 2:] @ found.values[2 : found.first]
-    return replace(places, torque=places.torque - carried)
+    moved = columns(places, (), moving)[:, 2:]
+    # In long strokes columns of the swing follow, which a picture leaves in.
+    return replace(places, torque=places.torque - moved @ found.values[2 : 2 + moved.shape[1]])

@@ -191,7 +191,9 @@ def _motion(places: Places, terms: Sequence[Term], delay: float) -> tuple[Places
     if not orders or orders[-1] <= FAST:
         return own, {}
     fast = seen - slow
-    return own, {"fast_viscous": fast[:, 0], "fast_lag": fast[:, 1] / np.abs(places.velocity)}
+    # Strokes too short for a swing show none, and a column of zeros tells nothing.
+    swings = {"fast_viscous": fast[:, 0], "fast_lag": fast[:, 1] / np.abs(places.velocity)}
+    return own, {name: column for name, column in swings.items() if np.any(column)}
 
 
 def _answers(
