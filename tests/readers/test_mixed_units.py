@@ -11,6 +11,7 @@ import pytest
 from stickslip.cli import main
 from stickslip.errors import InputError
 from stickslip.readers import Drive, read
+from stickslip.readers.profiles import Profile, merged
 
 LEAD = 0.005
 T = np.arange(200) * 1e-3
@@ -63,6 +64,10 @@ def test_the_torque_constant_of_a_screw_drive(tmp_path):
     assert "N/A" in linear.meta["derived"]["motor_torque"]
     said = [f["message"] for f in linear.meta["reading"]["findings"] if f["code"] == "mixed-units"]
     assert said == ["the axis moves along a line: --torque-constant 2 was taken in N/A"]
+    motor = read(path, drive=Drive(force_constant=2.0))
+    assert motor["motor_torque"] == pytest.approx(2.0 * TORQUE)
+    assert motor.units["motor_torque"] == "N"
+    assert not [f for f in motor.meta["reading"]["findings"] if f["code"] == "mixed-units"]
     screw = read(path, drive=Drive(torque_constant=2.0, lead=LEAD))
     assert screw["motor_torque"] == pytest.approx(2.0 * TORQUE * 2.0 * math.pi / LEAD)
     assert screw.units["motor_torque"] == "N"
@@ -91,3 +96,16 @@ def test_a_lead_that_is_none(tmp_path, capsys, lead):
     path = written(tmp_path / "log.csv", "time [s],position [mm],motor_torque [Nm]", 1e3 * Q, TORQUE)
     assert main(["doctor", str(path), "--lead", lead]) == 2
     assert "lead" in capsys.readouterr().err
+
+
+def test_a_linear_motors_constant_is_no_screws_and_no_turning_motors(tmp_path):
+    for beside in ({"lead": LEAD}, {"torque_constant": 2.0}):
+        with pytest.raises(InputError, match=r"force_constant = 3 N/A is a linear motor's.*give one of them"):
+            Drive(force_constant=3.0, **beside)
+    path = written(tmp_path / "log.csv", "time [s],position [deg],current [A]", Q, TORQUE)
+    with pytest.raises(InputError, match="positions are angles; give --torque-constant"):
+        read(path, drive=Drive(force_constant=3.0))
+    kept = Profile({}, Drive(torque_constant=2.0, gear_ratio=5.0))
+    assert merged([], Drive(force_constant=3.0), None, kept).drive == Drive(
+        force_constant=3.0, gear_ratio=5.0
+    )

@@ -33,7 +33,9 @@ MOTION = (
     "acceleration",
 )
 EFFORT = ("motor_torque", "friction_torque", "sensor_torque", "compensation_torque")
-NUMBERS = ("counts_per_rev", "rated_torque", "rated_current", "torque_constant", "gear_ratio", "lead")
+NUMBERS = (
+    "counts_per_rev", "rated_torque", "rated_current", "torque_constant", "force_constant", "gear_ratio", "lead",
+)  # fmt: skip
 """What a drive's data sheet says, each a positive number."""
 LONGEST_LEAD = 1.6
 """m a revolution, of a drum of half a metre: a lead in millimetres is more, but for the finest screws."""
@@ -53,6 +55,8 @@ class Drive:
         A, for currents in percent or per mille.
     torque_constant : float
         N·m/A, for torque = current x torque constant.
+    force_constant : float
+        N/A, the same of a linear motor.
     gear_ratio : float
         Revolutions of the motor for one of the load.
     side : {"motor", "load"}
@@ -66,6 +70,7 @@ class Drive:
     rated_torque: float = math.nan
     rated_current: float = math.nan
     torque_constant: float = math.nan
+    force_constant: float = math.nan
     gear_ratio: float = math.nan
     side: str = "motor"
     lead: float = math.nan
@@ -75,6 +80,12 @@ class Drive:
             value = getattr(self, name)
             if not math.isnan(value) and not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"{name} = {value:g} must be greater than 0")
+        others = [n for n in ("torque_constant", "lead") if not math.isnan(getattr(self, n))]
+        if others and not math.isnan(self.force_constant):
+            raise InputError(
+                f"force_constant = {self.force_constant:g} N/A is a linear motor's, and {others[0]} = "
+                f"{getattr(self, others[0]):g} that of one that turns; give one of them"
+            )
         if self.lead > LONGEST_LEAD:
             raise InputError(
                 f"lead = {self.lead:g} m a revolution is more than any screw, pinion or pulley moves; it is in m "
@@ -275,11 +286,25 @@ def pendulum_before_gear(record: Record, told: str) -> list[Finding]:
     return [Finding("warning", "gear-ratio", message, remedy=remedy)]
 
 
+def _force_from_current(
+    channels: dict[str, Array], units: dict[str, str], constant: float, along: bool
+) -> dict[str, str]:
+    """Force = current x force constant, of an axis that moves along a line."""
+    if not along:
+        raise InputError(
+            f"--force-constant {constant:g} is a linear motor's, and the record's positions are angles; give "
+            "--torque-constant NM_PER_A"
+        )
+    channels["motor_torque"], units["motor_torque"] = constant * channels["current"], SI["force"]
+    return {"motor_torque": f"current x force constant {constant:g} N/A"}
+
+
 def _torque_from_current(
     channels: dict[str, Array], units: dict[str, str], drive: Drive, linear: bool
 ) -> tuple[dict[str, str], list[Finding]]:
     """Torque = current x torque constant, where a current and a constant are given and no torque."""
-    if "motor_torque" in channels or "current" not in channels or math.isnan(drive.torque_constant):
+    known = not (math.isnan(drive.torque_constant) and math.isnan(drive.force_constant))
+    if "motor_torque" in channels or "current" not in channels or not known:
         return {}, []
     factor, gear = drive.torque_constant, ""
     if drive.side == "load" and not math.isnan(drive.gear_ratio):
@@ -287,6 +312,8 @@ def _torque_from_current(
         gear = f" x gear ratio {drive.gear_ratio:g}"
     said: list[Finding] = []
     along = linear or any(units[c].startswith("m") for c in channels if c in MOTION)
+    if not math.isnan(drive.force_constant):
+        return _force_from_current(channels, units, drive.force_constant, along), []
     unit = SI["force" if along else "torque"]
     constant = f"{drive.torque_constant:g} {unit}/A"
     if along and not math.isnan(drive.lead):
@@ -296,8 +323,12 @@ def _torque_from_current(
     elif along:
         message = f"the axis moves along a line: --torque-constant {drive.torque_constant:g} was taken in N/A"
         said.append(
-            Finding("warning", "mixed-units", message, remedy="if it is in N·m/A, give the screw's --lead MM")
-        )
+            Finding(
+                "warning", "mixed-units", message,
+                remedy="if it is in N·m/A, give the screw's --lead MM; if it is a linear motor's, say so with "
+                "--force-constant N_PER_A in its place",
+            )
+        )  # fmt: skip
     channels["motor_torque"] = factor * channels["current"]
     units["motor_torque"] = unit
     return {"motor_torque": f"current x torque constant {constant}{gear}"}, said

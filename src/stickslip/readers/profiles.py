@@ -27,9 +27,11 @@ from stickslip.record import Record
 
 NUMBERS_BEHIND = {
     "speed": ("counts_per_rev", "gear_ratio", "lead"),
-    "torque": ("torque_constant", "rated_torque", "rated_current", "gear_ratio", "lead"),
+    "torque": ("torque_constant", "force_constant", "rated_torque", "rated_current", "gear_ratio", "lead"),
 }
 """Numbers of the drive on which the size of a signal depends."""
+OF_ONE_MOTOR = {"torque_constant", "force_constant"}
+"""Of which a motor has one; what is said now takes the place of the other."""
 OTHER = 4.0
 """Times as large, or as small, from which on it is asked whether they hold."""
 
@@ -145,7 +147,9 @@ def load(path: Path) -> Profile:
 def merged(mapping: Sequence[str], drive: Drive, sample_time: float | None, kept: Profile | None) -> Profile:
     """What is said now over what a profile says."""
     before = kept or Profile({}, Drive())
-    numbers = {**before.drive.known(), **drive.known()}
+    said = drive.known()
+    over = OF_ONE_MOTOR & said.keys()  # a linear motor has neither what turns has, nor the other way round
+    numbers = {n: x for n, x in before.drive.known().items() if not over or n not in OF_ONE_MOTOR} | said
     if drive.side == "motor" and before.drive.side == "load":
         numbers["side"] = "load"
     period = sample_time if sample_time is not None else before.sample_time

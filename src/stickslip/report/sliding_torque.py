@@ -111,14 +111,7 @@ def left_by_plain(regression: Regression, inverse: Any) -> float:
     """What the plain inverse dynamics leaves of the torque where the axis slides for certain, N·m (N)."""
     if not isinstance(inverse, InverseDynamics):
         return math.nan
-    gravity = {n: inverse[n] for n in ("gravity_sin", "gravity_cos") if inverse.has(n)}
-    own = {
-        "inertia": inverse["inertia"],
-        "sigma2": inverse.viscous,
-        "fc": inverse.coulomb,
-        "offset": inverse.offset,
-    }
-    return regression.left_by(own | gravity)
+    return regression.left_by(inverse.numbers())
 
 
 def part(rows: SlidingRows, skew: float, mechanics: Mechanics) -> dict[str, Array]:

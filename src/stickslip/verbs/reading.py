@@ -32,7 +32,9 @@ SIGNALS = (
     "t", "position", "reference", "velocity", "velocity_reference", "torque", "current", "voltage", "supply",
     "friction_torque", "sensor_torque", "compensation_torque", "normal_force", "temperature",
 )  # fmt: skip
-NUMBERS = ("counts_per_rev", "rated_torque", "rated_current", "torque_constant", "gear_ratio", "lead")
+NUMBERS = (
+    "counts_per_rev", "rated_torque", "rated_current", "torque_constant", "force_constant", "gear_ratio", "lead",
+)  # fmt: skip
 ARRAYS = (*SIGNALS, "units")
 """What says the signals themselves."""
 PART = ("start", "end", "rows", "leave_out", "unwrap")
@@ -54,7 +56,8 @@ class Reading(TypedDict, total=False):
     columns in your configuration folder, and uses what is kept there, as the command line does.
 
     Numbers of the data sheet, where units need them: `counts_per_rev`, `rated_torque` (N·m), `rated_current` (A),
-    `torque_constant` (N·m/A), `gear_ratio`, `side` ("motor" or "load"), `lead` (m a revolution).
+    `torque_constant` (N·m/A) or a linear motor's `force_constant` (N/A), `gear_ratio`, `side` ("motor" or "load"),
+    `lead` (m a revolution).
 
     Part of the log: `start` and `end` (s), `rows` (first, last; counted from 1, both included, also as "A:B"),
     `leave_out` (such ranges, or "spikes"), `unwrap` (count the position on where it jumps by a turn).
@@ -84,6 +87,7 @@ class Reading(TypedDict, total=False):
     rated_torque: float | None
     rated_current: float | None
     torque_constant: float | None
+    force_constant: float | None
     gear_ratio: float | None
     side: Literal["motor", "load"] | None
     lead: float | None

@@ -22,6 +22,7 @@ NUMBERS = (
     "rated_torque",
     "rated_current",
     "torque_constant",
+    "force_constant",
     "gear_ratio",
     "lead",
     "sample_time",

@@ -351,16 +351,9 @@ def as_good(inverse: InverseDynamics, found: Regression, times: float = AS_GOOD)
     little else is left. Where motor and load move as one in wider windows alone, it looks at what they do apart, and
     has no say.
     """
-    values = {
-        "inertia": inverse["inertia"],
-        "sigma2": inverse.viscous,
-        "fc": inverse.coulomb,
-        "offset": inverse.offset,
-    }
-    gravity = {n: inverse[n] for n in ("gravity_sin", "gravity_cos") if inverse.has(n)}
     if found.widened > 1.0:
         return False
-    return found.unexplained_by(values | gravity) <= times * found.unexplained_by(found.own)
+    return found.unexplained_by(inverse.numbers()) <= times * found.unexplained_by(found.own)
 
 
 def both_told(e: Estimate, other: Estimate, p: Parameter) -> Estimate:

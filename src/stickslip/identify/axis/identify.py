@@ -200,8 +200,9 @@ def refuse_a_weight(sliding: Regression | None, axis: ServoAxis) -> None:
     for name in ("fc_positive", "fc_negative"):
         if sliding.interval(name)[1] < 0.0:
             raise InputError(
-                f"a constant torque of {constant:.3g} {axis.unit('N·m')} is larger than friction, {level:.3g}, so that "
-                "it is no difference of its directions but a weight, a spring or an offset; leave out --per-direction"
+                f"a constant torque of {constant:.3g} {axis.unit('N·m')} acts, a weight, a spring or an offset, larger "
+                f"than friction, {level:.3g}: it cannot be told from a difference of friction's directions; leave out "
+                "--per-direction"
             )
 
 

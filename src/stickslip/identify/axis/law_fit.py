@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.binding import NEGATIVE
 from stickslip.identify.axis.agreed import (
     agreed,
     as_good,
@@ -31,6 +32,7 @@ from stickslip.identify.axis.problem import Problem
 from stickslip.identify.axis.result import assembled, evident, noted, told_whole, untold_by_reversals
 from stickslip.identify.axis.search import Asked, Extras, FittedAxis, laid_out, starting_models
 from stickslip.identify.axis.settled import ALIKE, settled
+from stickslip.identify.axis.settled_each_way import settled_each_way
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Vector
@@ -145,6 +147,8 @@ def beside_plain(
     estimates: Sequence[Estimate], model: Model, inverse: InverseDynamics, sliding: Regression
 ) -> tuple[tuple[Estimate, ...], list[str]]:
     """The estimates settled beside the plain inverse dynamics, as far as certain sliding does not refute it."""
+    if any(e.name == f"fc{NEGATIVE}" for e in estimates):
+        return settled_each_way(estimates, model, inverse, falls=sliding.shows_a_fall), []
     if as_good(inverse, sliding, ALIKE):
         return settled(estimates, model, inverse)
     own = {n: (low, high) for n, (_, low, high) in sliding_values(sliding, model.law).items()}

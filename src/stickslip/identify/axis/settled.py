@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.axis.gravity import hanging
+from stickslip.identify.axis.gravity import hanging, of_one_weight
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.bounded import within_bounds
 from stickslip.identify.fit.uncertainty import RATIO, SHARE
@@ -230,6 +230,7 @@ def settled(
     falls : bool
         Whether certain sliding shows that friction falls with velocity, which the inverse dynamics knows nothing of.
     """
+    estimates = of_one_weight(estimates)
     by_name = {e.name: e for e in estimates}
     if inverse is None or model.law.steady is None or not set(PLAIN) <= by_name.keys():
         return tuple(estimates), []

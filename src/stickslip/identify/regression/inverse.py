@@ -81,6 +81,12 @@ class InverseDynamics:
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)])
 
+    def numbers(self) -> dict[str, float]:
+        """Inertia, slope, level, offset and a pendulum's gravity by the names that certain sliding has for them."""
+        gravity = {n: self[n] for n in ("gravity_sin", "gravity_cos") if self.has(n)}
+        own = {"inertia": self["inertia"], "sigma2": self.viscous, "fc": self.coulomb, "offset": self.offset}
+        return own | gravity
+
     def has(self, name: str) -> bool:
         """Whether it estimated that parameter."""
         return name in self.names
