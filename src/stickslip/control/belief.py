@@ -8,7 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from stickslip.binding import NEGATIVE
 from stickslip.errors import ParameterError
+from stickslip.friction_levels import Levels, levels_of
 from stickslip.model import Model
 
 
@@ -52,20 +54,11 @@ class Belief:
     def levels(self) -> Mapping[str, float]:
         """fs, fc (N·m), vs (rad/s), sigma2 (N·m·s/rad), delta_s and sigma0 (N·m/rad) of the LuGre law.
 
-        Of another sliding curve than Stribeck's: its level at rest, and the line through two speeds beyond its scale.
+        Of one with parameters per direction the mean of both.
         """
-        law, p = self.friction.law, self.friction.parameters
-        own = {"delta_s": 2.0, **p._asdict()}
-        if {"fs", "fc", "vs"} <= own.keys() and law.option_of("viscous") == "linear":
-            return own
-        assert law.steady is not None
-        scale = law.velocity_scale(p) if law.velocity_scale else 0.01
-        slow, fast = 5.0 * scale, 50.0 * scale
-        rise = max((law.steady(fast, p) - law.steady(slow, p)) / (fast - slow), 0.0)
-        return {
-            "fs": law.steady(1e-6 * scale, p), "fc": law.steady(slow, p) - rise * slow, "vs": scale, "sigma2": rise,
-            "delta_s": 2.0, "sigma0": own["sigma0"],
-        }  # fmt: skip
+        forward, backward = (levels_of(self.friction, direction) for direction in (1.0, -1.0))
+        mean = (0.5 * (one + other) for one, other in zip(forward, backward, strict=True))
+        return {**dict(zip(forward._fields, mean, strict=True)), "sigma0": self.friction.parameters.sigma0}
 
     def number(self, name: str) -> float:
         """One of `levels`."""
@@ -92,7 +85,8 @@ BENDS = 1e-3
 
 
 def believed(model: Model, inertia: float, **more: Any) -> Belief:
-    """The belief by whichever friction law is known: a LuGre law of its levels; a GMS law is kept besides.
+    """The belief by whichever friction law is known: a LuGre law of its levels (`stickslip.friction_levels`), of both
+    directions where they differ; a GMS law is kept besides.
 
     Parameters
     ----------
@@ -105,26 +99,35 @@ def believed(model: Model, inertia: float, **more: Any) -> Belief:
     Raises
     ------
     ParameterError
-        If the law says nothing of sliding at constant velocity, or has no friction there.
+        If the law has no torque at constant velocity, or no friction there.
     """
-    law, p = model.law, model.parameters
+    law, own = model.law, model.parameters._asdict()
     if law.name == "lugre":
         return Belief(inertia, model, **more)
     if law.steady is None:
         raise ParameterError(
             f"belief: law {law.name!r} has no torque at constant velocity; identify one with a sliding curve"
         )
-    scale = float(law.velocity_scale(p)) if law.velocity_scale else 0.01
-    rest, slow, fast = (float(law.steady(x * scale, p)) for x in (1e-6, 5.0, 50.0))
-    rise = max((fast - slow) / (45.0 * scale), 0.0)
-    level = slow - 5.0 * rise * scale
-    if not (rest > 0.0 and level > 0.0):
-        raise ParameterError(
-            f"belief: law {law.name!r} has no friction of {rest:g} N·m at rest to compensate"
-        )
-    own = p._asdict()
+    ways = tuple(levels_of(model, direction) for direction in ((1.0,) if law.odd else (1.0, -1.0)))
+    for way in ways:
+        if not (way.fs > 0.0 and way.fc > 0.0):
+            raise ParameterError(
+                f"belief: law {law.name!r} has no friction at rest to compensate (static {way.fs:.3g} N·m, Coulomb "
+                f"{way.fc:.3g} N·m)"
+            )
     # The "k" of a Stribeck law is a slope over the velocity and no spring.
     springs = any(f.name == "k" and f.per_element for f in law.fields)
+    rest = sum(way.fs for way in ways) / len(ways)
     stiffness = float(sum(own["k"])) if springs else float(own.get("sigma0", rest / BENDS))
-    bristle = Model("lugre", sigma0=stiffness, sigma1=0.0, fs=rest, fc=level, vs=scale, sigma2=rise)
+    bristle = _bristle(stiffness, *ways)
     return Belief(inertia, bristle, model if law.name == "gms" else None, **more)
+
+
+def _bristle(stiffness: float, forward: Levels, backward: Levels | None = None) -> Model:
+    """A LuGre law of those levels, N·m/rad its stiffness; of both directions where the second has its own."""
+    values = forward._asdict()
+    if backward in (None, forward):
+        return Model("lugre", sigma0=stiffness, sigma1=0.0, **values)
+    assert backward is not None
+    values |= {name + NEGATIVE: value for name, value in backward._asdict().items()}
+    return Model("lugre", {"symmetry": "asymmetric"}, sigma0=stiffness, sigma1=0.0, **values)

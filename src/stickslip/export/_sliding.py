@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.friction_levels import independent, static_level
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
@@ -103,14 +104,10 @@ class Curve:
     @cached_property
     def rest(self) -> tuple[float, float]:
         """What the contact withstands at rest in both directions, N·m; of one that creeps, where it lets go."""
-        law, p = self.model.law, self.model.parameters
-        if law.holding is not None:
-            z = law.state(p)
-            hold = law.holding
-            return abs(hold(1.0, z, p, Surroundings())), abs(hold(-1.0, z, p, Surroundings()))
-        edge = 1.05 * self.slowest if self.slowest > 0.0 else 1e-9 * self.top
-        if self.slowest == 0.0 and not law.state_fields:
-            return 0.0, 0.0
+        law = self.model.law
+        if law.steady is not None or law.holding is not None:
+            return static_level(self.model), static_level(self.model, -1.0)
+        edge = 1e-9 * self.top
         return self.torque(edge), -self.torque(-edge)
 
     def torque(self, velocity: float) -> float:
@@ -125,17 +122,6 @@ class Curve:
             if abs(torque - before) <= 1e-12 * abs(torque):
                 break
         return torque
-
-
-def independent(model: Model) -> Model:
-    """The model without its dependences, at the surroundings for which its parameters hold."""
-    law = model.law
-    chosen = {c.name: "none" for c in law.choices if law.option(c).reads_surroundings}
-    if not chosen:
-        return model
-    bare = law.having(**chosen)
-    values: dict[str, Any] = model.parameters._asdict()
-    return Model(bare, **{f.name: values[f.name] for f in bare.fields})
 
 
 def velocity_scale(model: Model) -> float:

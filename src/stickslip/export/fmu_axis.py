@@ -24,6 +24,7 @@ from stickslip.export._text import ascii_only, first_line, render
 from stickslip.export.golden import csv_of
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Setting, Target, settings_of
+from stickslip.friction_levels import static_level
 from stickslip.subset import named
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -179,7 +180,8 @@ def driven(job: Job, count: int = 400, step: float = 1e-3, seed: int = 1) -> Dri
 
     draw = np.random.default_rng(seed)
     law, p = job.model.law, job.model.parameters
-    sliding = abs(law.steady(1e-3, p)) if law.steady else 1.0
+    # Of a viscous law, which lets go at once, its torque at a low speed.
+    sliding = static_level(job.model) or abs(law.steady(1e-3, p)) if law.steady else 1.0
     level = sliding * draw.choice((-1.0, 1.0), count) * draw.uniform(0.0, 1.6, count)
     torque = np.repeat(level, 20)[:count]
     time: Array = step * np.arange(count + 1, dtype=np.float64)

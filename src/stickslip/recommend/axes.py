@@ -17,10 +17,11 @@ import numpy as np
 
 from stickslip.binding import NEGATIVE
 from stickslip.errors import ParameterError
+from stickslip.friction_levels import static_level
 from stickslip.identify.axis.falling import missing_fall
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.monte_carlo import draw_models, sliding_torque
+from stickslip.identify.monte_carlo import draw_models
 from stickslip.machines.machine import Machine
 from stickslip.model import Model
 from stickslip.recommend.plant import Plant
@@ -198,7 +199,7 @@ def _with_springs(
         scale = float(model.law.velocity_scale(own)) if model.law.velocity_scale else 0.0
         for side in _ways(model):
             curve |= {f"fs{side}": curve[f"fc{side}"], f"vs{side}": scale or 0.01 * size}
-    level = float(np.abs(sliding_torque(model, np.zeros(1)))[0])
+    level = static_level(model)
     if not level > 0.0:
         return model
     stiffness = level / way

@@ -13,6 +13,7 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import COMPENSATORS
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
+from stickslip.friction_levels import static_level
 from stickslip.identify.fit.parallel import in_turn
 from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.machines.rigid import RigidAxis
@@ -247,10 +248,7 @@ def on_both(setting: Setting, bench: Bench, others: Bench) -> Candidate:
 def breakaway(model: Model) -> float:
     """The torque that the contact withstands at rest, of both directions the greater, N·m; 0 where the law does not
     tell it."""
-    if not model.law.steady:
-        return 0.0
-    # The least velocity there is stands for rest on the negative side.
-    return float(np.max(np.abs(sliding_torque(model, np.array([0.0, -np.finfo(float).tiny])))))
+    return max(static_level(model), static_level(model, -1.0)) if model.law.steady else 0.0
 
 
 def resistance(model: Model, drive: Drive) -> float:
@@ -258,7 +256,7 @@ def resistance(model: Model, drive: Drive) -> float:
     if not model.law.steady:
         return 0.0
     v = drive.path.top_speed * np.concatenate([np.linspace(0.0, 1.0, 200), -np.linspace(1e-9, 1.0, 200)])
-    return float(np.max(np.abs(sliding_torque(model, v))))
+    return max(breakaway(model), float(np.max(np.abs(sliding_torque(model, v)))))
 
 
 def rings_alone(bench: Bench, inertia: float, torque: str) -> str:

@@ -13,11 +13,10 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from stickslip.errors import InputError
+from stickslip.friction_levels import line_beyond
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.monte_carlo import sliding_torque, with_values
+from stickslip.identify.monte_carlo import with_values
 from stickslip.model import Model
 from stickslip.recommend.axes import plants_of
 from stickslip.recommend.beside import belief_of, limit_cycle, tried_beside
@@ -242,8 +241,7 @@ def laws_of(model: Model) -> dict[str, Model]:
     laws = {model.law.name: model}
     if model.law.name == "coulomb" or not model.law.steady:
         return laws
-    scale = float(model.law.velocity_scale(model.parameters)) if model.law.velocity_scale else 0.1
-    (level, slope), (back, falling) = (line_through(model, d * scale) for d in (1.0, -1.0))
+    (level, slope), (back, falling) = (line_beyond(model, d) for d in (1.0, -1.0))
     if level <= 0.0 or back <= 0.0:
         return laws
     if model.law.chosen.get("symmetry") != "asymmetric":
@@ -252,14 +250,6 @@ def laws_of(model: Model) -> dict[str, Model]:
     each = {"fc": level, "sigma2": slope, "fc_negative": back, "sigma2_negative": falling}
     laws["coulomb"] = Model("coulomb", {"symmetry": "asymmetric"}, **each)
     return laws
-
-
-def line_through(model: Model, scale: float) -> tuple[float, float]:
-    """Level (N·m) and slope (N·m·s/rad) of friction in the direction of `scale`, rad/s, the velocity over which it
-    changes: beyond the Stribeck effect, which Coulomb's law does not have."""
-    v = np.linspace(5.0, 50.0, 20) * scale
-    slope, level = (float(x) for x in np.polyfit(np.abs(v), np.abs(sliding_torque(model, v)), 1))
-    return level, max(slope, 0.0)
 
 
 def settings_of(

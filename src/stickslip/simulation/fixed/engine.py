@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import ParameterError
+from stickslip.friction_levels import static_level
 from stickslip.jit import kernel, pointer
 from stickslip.simulation._meter import close_standstill, new_meter, turning_points
 from stickslip.simulation.case_arrays import (
@@ -179,7 +180,7 @@ def travel_of(case: Case) -> float:
     model = case.plant.model
     if model is None or model.law.steady is None or not model.law.state_fields:
         return math.inf
-    return abs(model.law.steady(1e-9, model.parameters)) / case.numbers[STIFFNESS] or math.inf
+    return static_level(model) / case.numbers[STIFFNESS] or math.inf
 
 
 def velocity_scale(case: Case) -> float:
