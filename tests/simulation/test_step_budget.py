@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError, StepFailure
+from stickslip.errors import InputError, ModelRemark, StepFailure
 from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.case_arrays import TOO_STIFF, StepBudget
 from stickslip.simulation.closed_loop import prepare
@@ -37,6 +37,8 @@ def test_too_many_steps_end_the_run_with_the_remedy(module, name, inertia, frequ
     whole = taken * 0.5 / caught.value.time
     assert f"{taken:,} so far; at this pace 0.5 s take some {whole:.2g}" in said
     assert "use the fixed integrator" in said
+    assert "try a tolerance above 1e-09 rad" in said
+    assert ('integrator="adaptive"' in said) == (name == "exact")
     assert "\n" not in said
 
 
@@ -82,3 +84,33 @@ def test_more_samples_than_memory_holds_are_refused_before_the_run(monkeypatch):
         InputError, match=r"1e\+08 steps of sample_time = 1e-08 s need 10 GB .* use a longer one"
     ):
         prepare(axis, sampled, reference, 1.0)
+
+
+def test_auto_goes_on_with_the_next_integrator_where_one_finds_no_step(monkeypatch):
+    """And says so; left with fixed steps, which keep no tolerance, it warns."""
+    axis, controller, reference = loop(4e-4, 1.0)
+    known = ss.simulate(axis, controller, reference, 0.2, integrator="adaptive")["position"][-1]
+    monkeypatch.setattr(exact, "STEPS", StepBudget(50.0, 0.0, 0.0))
+    ran = ss.simulate(axis, controller, reference, 0.2)
+    assert ran.meta["integrator"] == "adaptive"
+    assert ran.meta["refused"]["exact"].startswith("ended at 0.")
+    assert ran["position"][-1] == pytest.approx(known, abs=1e-7)
+    monkeypatch.setattr(adaptive, "STEPS", StepBudget(50.0, 0.0, 0.0))
+    with pytest.warns(
+        ModelRemark, match="the fixed integrator ran this, whose steps of 0.0001 s keep no tolerance"
+    ):
+        ran = ss.simulate(axis, controller, reference, 0.2)
+    assert ran.meta["integrator"] == "fixed"
+    assert set(ran.meta["refused"]) == {"exact", "adaptive", "sampled"}
+    assert ran["position"][-1] == pytest.approx(known, abs=1e-4)
+
+
+def test_fixed_steps_that_were_asked_for_are_no_surprise(recwarn):
+    steep = ss.RigidAxis(4e-4, ss.Model("stribeck", k=3.5e4, fs=0.335, fc=0.285, vs=0.01, sigma2=0.018))
+    motion = ss.Reference("sine", amplitude=0.1, frequency=1.0)
+    ss.simulate(steep, PD, motion, 0.05, integrator="fixed")
+    assert not recwarn
+    with pytest.warns(
+        ModelRemark, match=r"slows the axis down at 9e\+07 /s\); compare with a tenth of the time_step"
+    ):
+        ss.simulate(steep, PD, motion, 0.05)

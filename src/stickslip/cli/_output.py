@@ -131,7 +131,8 @@ def print_integrator(meta: Mapping[str, Any]) -> None:
             f"machine: {machine['name']}{left}, sampled every {meta['sample_time']:g} s in {every} sub-steps"
         )
     if refused := meta.get("refused"):
-        print(f"integrator: {meta['integrator']}; {'; '.join(refused.values())}")
+        loose = " (its steps keep no tolerance)" if meta["integrator"] == "fixed" else ""
+        print(f"integrator: {meta['integrator']}{loose}; {'; '.join(refused.values())}")
 
 
 def result_as_data(result: StudyResult, report: Path | None) -> dict[str, Any]:

@@ -16,6 +16,11 @@ from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.spec import Bristle, Law, Mode, Par
 
+CLOSE = 1e-12
+"""Of F_C, from the level on which a brittle contact's force rises evenly through it: the level, which it meets as a
+tangent with a slope without bound, is then crossed, and the crossing located. Pulled back from beyond, an explicit
+step never gets there."""
+
 
 class Params(NamedTuple):
     """Parameters of thesis eq. 2.7."""
@@ -52,7 +57,10 @@ def rate(v: float, z: Any, p: Any, u: Any, dz: Any) -> float:
     dz.force = 0.0
     if abs(z.mode) < 2.0:
         r = 1.0 - direction_of(v) * z.force / p.fc
-        dz.force = math.copysign(p.sigma0 * abs(r) ** p.delta_d, r) * v
+        if p.delta_d < 1.0:
+            dz.force = p.sigma0 * max(r, CLOSE) ** p.delta_d * v
+        else:
+            dz.force = math.copysign(p.sigma0 * abs(r) ** p.delta_d, r) * v
     return z.force + viscous(v, p)
 
 

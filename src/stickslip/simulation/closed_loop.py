@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+import warnings
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,61 +15,22 @@ from stickslip.arguments import arguments_checked
 from stickslip.capacity import insist_on_memory
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
-from stickslip.errors import (
-    Divergence,
-    EventStorm,
-    InputError,
-    ParameterError,
-    SimulationError,
-    StepFailure,
-    UnknownName,
-)
+from stickslip.errors import InputError, ModelRemark, ParameterError
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.record import Record
 from stickslip.simulation import case_arrays
-from stickslip.simulation.case_arrays import (
-    COLUMNS,
-    UNITS,
-    Case,
-    Outcome,
-    lay_out,
-    slip_rules,
-)
+from stickslip.simulation.case_arrays import COLUMNS, UNITS, Case, Outcome, lay_out, slip_rules
+from stickslip.simulation.integrators import insist_on_steps, integrated, reason, without_tolerance
 from stickslip.simulation.metrics import metrics
 
-INTEGRATORS = ("exact", "adaptive", "sampled", "fixed")
-"""In the order in which `integrator="auto"` tries them."""
-
-MOST_STEPS = 1e9
-"""Of a fixed length"""
 SAMPLE = 100.0
 """Bytes that the schedule of one sample takes while it is made"""
 ON_A_MACHINE = 100.0
 """Tolerances that a sub-step of a machine may be wrong by; what its loop sees is coarser by far."""
 SHORTEST = 1e-9
 """s, of a run: one-sided limits are taken a thousandth of it beside kinks and ends."""
-
-REASONS: dict[int, tuple[type[SimulationError], str]] = {
-    case_arrays.DIVERGED: (Divergence, "position or velocity left every reasonable bound"),
-    case_arrays.NOT_FINITE: (Divergence, "the state is no longer a number"),
-    case_arrays.STORM: (
-        EventStorm,
-        f"more than {case_arrays.STORM_EVENTS} switches within {case_arrays.STORM_TIME * 1e3:g} ms",
-    ),
-    case_arrays.NO_STEP: (StepFailure, "no step that meets the tolerance was found"),
-    case_arrays.ROWS_FULL: (StepFailure, "the record is full"),
-    case_arrays.TOO_STIFF: (
-        StepFailure,
-        "far more steps than a motion of its length takes",
-    ),
-    case_arrays.TOO_FAST: (
-        StepFailure,
-        "a part of the motion is so fast that its metrics take more than a million nodes of a single step; lower "
-        "the controller's gains or bandwidth, or raise the inertia",
-    ),
-}
 
 
 @arguments_checked
@@ -99,7 +61,7 @@ def simulate(
     duration : float
         s
     integrator : {"auto", "exact", "adaptive", "sampled", "fixed"}
-        "auto" takes the first that can run the case.
+        "auto" takes the first that can run the case, and goes on with the next where that one finds no step.
     tolerance : float
         Position error that a well-conditioned run may gather, rad (exact, adaptive and sampled). A machine's sub-steps
         are each within a hundred times that.
@@ -129,7 +91,8 @@ def simulate(
         ``record.meta["learned"]`` says what its laws have learned: value, unit and uncertainty (half the interval that
         holds 95 of 100 times; None where a law has no covariance) by name (`stickslip.control.learned`).
         ``record.meta["slip_rules"]`` says by which rule each law ran that has one (``friction``, ``compensator``);
-        ``record.meta["refused"]``, where "auto" did not take the first integrator, says why, by integrator.
+        ``record.meta["refused"]``, where "auto" did not take the first integrator, says why, by integrator: what it
+        cannot run, or where it found no step.
 
     Raises
     ------
@@ -138,6 +101,11 @@ def simulate(
     SimulationError
         If the run diverges, leaves the finite numbers or switches without end; it says when and why, and its
         ``record`` holds what was computed.
+
+    Warns
+    -----
+    ModelRemark
+        Where "auto" is left with the fixed integrator, whose steps keep no tolerance.
     """
     _insist_on_tolerance(tolerance)
     if isinstance(axis, Machine):
@@ -154,7 +122,10 @@ def simulate(
         axis, controller, reference, duration,
         tolerance=tolerance, slip_rule=slip_rule, output=output, initial=initial, metered=metered,
     )  # fmt: skip
-    return run_case(case, integrator, time_step, slip_rule, check=check)
+    record = run_case(case, integrator, time_step, slip_rule, check=check)
+    if said := without_tolerance(record.meta, time_step):
+        warnings.warn(f"simulate: {said}", ModelRemark, stacklevel=3)
+    return record
 
 
 def run_case(
@@ -171,10 +142,7 @@ def run_case(
     With `start` alone, only the dependence on the start is looked at, where the exact integrator runs the case: that
     costs a tenth of the run.
     """
-    name, run, refused = integrator_for(case, integrator)
-    if name == "fixed":
-        _insist_on_steps("time_step", time_step, float(case.numbers[case_arrays.DURATION]))
-    outcome: Outcome = run(case, time_step) if name == "fixed" else run(case)
+    name, outcome, refused = integrated(case, integrator, time_step)
     how: dict[str, Any] = {"integrator": name, "slip_rule": slip_rule}
     if refused:
         how["refused"] = dict(refused)
@@ -194,23 +162,9 @@ def run_case(
         how["accuracy"] = {"start_rad": apart, "depends_on_start": accuracy.branches(apart)}
     record = _record(case, outcome, how)
     if outcome.code != case_arrays.DONE:
-        kind, why = REASONS[outcome.code]
-        if outcome.code == case_arrays.TOO_STIFF:
-            why += _in_numbers(case, outcome)
+        kind, why = reason(case, name, outcome)
         raise kind(f"the run ended at {outcome.time:.6g} s: {why}", outcome.time, record)
     return record
-
-
-def _in_numbers(case: Case, outcome: Outcome) -> str:
-    """What a run that took too many steps would have taken, and what to do."""
-    steps = outcome.counts["steps"]
-    duration = float(case.numbers[case_arrays.DURATION])
-    whole = f"some {steps * duration / outcome.time:.2g}" if outcome.time > 0.0 else "no number of them"
-    other = ", or use the fixed integrator" if case.numbers[case_arrays.SAMPLE_TIME] == 0.0 else ""
-    return (
-        f", {steps:,} so far; at this pace {duration:g} s take {whole}: friction is too stiff for the inertia, or the "
-        f"reference too fast; check them, give a shorter duration{other}"
-    )
 
 
 def prepare(
@@ -263,7 +217,7 @@ def check_run(duration: float, initial: tuple[float, float], sample_time: float)
     ParameterError
     """
     if not (math.isfinite(duration) and duration > 0.0):
-        raise ParameterError(f"simulate: duration = {duration:g} s must be greater than 0")
+        raise ParameterError(f"simulate: duration = {duration:g} s must be greater than 0 and finite")
     if duration < SHORTEST:
         raise ParameterError(
             f"simulate: duration = {duration:g} s is shorter than {SHORTEST:g} s, in which nothing moves; give a "
@@ -272,7 +226,7 @@ def check_run(duration: float, initial: tuple[float, float], sample_time: float)
     if not all(math.isfinite(x) for x in initial):
         raise ParameterError(f"simulate: initial = {initial} must be two finite numbers")
     if sample_time > 0.0:
-        _insist_on_steps("sample_time", sample_time, duration)
+        insist_on_steps("sample_time", sample_time, duration)
         samples = duration / sample_time
         insist_on_memory(
             SAMPLE * samples, f"simulate: {samples:.3g} steps of sample_time = {sample_time:g} s",
@@ -282,24 +236,14 @@ def check_run(duration: float, initial: tuple[float, float], sample_time: float)
 
 def _insist_on_tolerance(tolerance: float) -> None:
     if not (math.isfinite(tolerance) and tolerance > 0.0):
-        raise ParameterError(f"simulate: tolerance = {tolerance:g} rad must be greater than 0")
-
-
-def _insist_on_steps(name: str, step: float, duration: float) -> None:
-    """Refuse more steps than a computer takes within an hour or so; every integrator bounds its own besides."""
-    if not (step > 0.0 and duration / step <= MOST_STEPS):
-        count = duration / step if step > 0.0 else math.inf
-        raise ParameterError(
-            f"simulate: {name} = {step:g} s makes {count:.3g} steps of {duration:g} s, {MOST_STEPS:g} at most; use a "
-            "longer one or a shorter duration"
-        )
+        raise ParameterError(f"simulate: tolerance = {tolerance:g} rad must be greater than 0 and finite")
 
 
 def _grid(output: float | Sequence[float] | np.ndarray[Any, Any], duration: float) -> Any:
     """The times at which rows are wanted."""
     if isinstance(output, (int, float)):
         if not (math.isfinite(output) and output > 0.0):
-            raise ParameterError(f"simulate: output = {output:g} s must be greater than 0")
+            raise ParameterError(f"simulate: output = {output:g} s must be greater than 0 and finite")
         ratio = duration / output * (1.0 + 1e-12)
         count = math.floor(ratio) if math.isfinite(ratio) else ratio
         if count > 50_000_000:
@@ -314,35 +258,6 @@ def _grid(output: float | Sequence[float] | np.ndarray[Any, Any], duration: floa
     if times.size and (times[0] < 0.0 or times[-1] > duration):
         raise ParameterError(f"simulate: output times must lie within 0 and {duration:g} s")
     return times
-
-
-class Choice(NamedTuple):
-    """The integrator for a case: its name, its ``run``, and why those that "auto" tries before it cannot run it."""
-
-    name: str
-    run: Any
-    refused: Mapping[str, str]
-
-
-def integrator_for(case: Case, name: str = "auto") -> Choice:
-    """That integrator, or the first that can run the case; `InputError` if it cannot."""
-    if name != "auto":
-        if name not in INTEGRATORS:
-            raise UnknownName("integrator", name, (*INTEGRATORS, "auto"))
-        module = importlib.import_module(f"stickslip.simulation.{name}.engine")
-        if why := module.can_run(case):
-            raise InputError(f"the {name} integrator cannot run this: {why}")
-        return Choice(name, module.run, {})
-    refused: dict[str, str] = {}
-    for candidate in INTEGRATORS:
-        module = importlib.import_module(f"stickslip.simulation.{candidate}.engine")
-        why = module.can_run(case)
-        if not why:
-            return Choice(candidate, module.run, refused)
-        refused[candidate] = why
-    raise InputError(
-        "no integrator can run this (" + "; ".join(f"{k}: {why}" for k, why in refused.items()) + ")"
-    )
 
 
 def _record(case: Case, outcome: Outcome, how: dict[str, Any]) -> Record:

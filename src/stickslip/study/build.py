@@ -20,7 +20,7 @@ from stickslip.machines.machine import IMPERFECTIONS, Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.model_tables import friction_laws, model, models, refuse_unknown
-from stickslip.simulation.closed_loop import INTEGRATORS
+from stickslip.simulation.integrators import INTEGRATORS
 from stickslip.spec import Law
 
 __all__ = [

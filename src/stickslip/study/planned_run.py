@@ -17,7 +17,8 @@ from stickslip.machines.numbers import machine_numbers
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.record import Record
-from stickslip.simulation.closed_loop import check_machine_run, integrator_for, prepare, run_case, simulate
+from stickslip.simulation.closed_loop import check_machine_run, prepare, run_case, simulate
+from stickslip.simulation.integrators import integrator_for
 from stickslip.study.build import Numerics
 from stickslip.study.provenance import engine_hash, source_hash
 

@@ -14,7 +14,8 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.simulation import case_arrays
 from stickslip.simulation.accuracy import LOOSER, PERTURBATIONS
-from stickslip.simulation.closed_loop import REASONS, integrator_for, prepare
+from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.integrators import REASONS, integrator_for
 from stickslip.simulation.machine.layout import TOLERANCE
 from stickslip.simulation.machine.loop import simulate_machine
 from stickslip.simulation.many import batch, simd_batch

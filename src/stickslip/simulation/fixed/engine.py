@@ -95,7 +95,7 @@ def run(case: Case, dt: float) -> Outcome:
         If `dt` is not a positive number.
     """
     if not (dt > 0.0 and math.isfinite(dt)):
-        raise ParameterError(f"fixed integrator: dt = {dt:g} s must be greater than 0")
+        raise ParameterError(f"fixed integrator: dt = {dt:g} s must be greater than 0 and finite")
     n = case.numbers
     laid, duration = laid_out(case, dt), float(n[DURATION])
     reached = laid.reached

@@ -49,7 +49,7 @@ class Results:
     Attributes
     ----------
     codes : array of int, shape (n,)
-        0 where the loop ran to its end; else why not (`stickslip.simulation.closed_loop.REASONS`).
+        0 where the loop ran to its end; else why not (`stickslip.simulation.integrators.REASONS`).
     time, position, velocity : array, shape (n,)
         Where it ended, s, rad, rad/s.
     metrics : mapping of str to array, shape (n,)

@@ -1,0 +1,156 @@
+"""Which integrator runs a case, and why a run of one ended."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from stickslip.errors import (
+    Divergence,
+    EventStorm,
+    InputError,
+    ParameterError,
+    SimulationError,
+    StepFailure,
+    UnknownName,
+)
+from stickslip.simulation import case_arrays
+from stickslip.simulation.case_arrays import Case, Outcome
+
+INTEGRATORS = ("exact", "adaptive", "sampled", "fixed")
+"""In the order in which `integrator="auto"` tries them."""
+
+MOST_STEPS = 1e9
+"""Of a fixed length"""
+NO_STEPS = (case_arrays.NO_STEP, case_arrays.TOO_STIFF, case_arrays.ROWS_FULL)
+"""How a run ends that another integrator may well come through."""
+
+REASONS: dict[int, tuple[type[SimulationError], str]] = {
+    case_arrays.DIVERGED: (Divergence, "position or velocity left every reasonable bound"),
+    case_arrays.NOT_FINITE: (Divergence, "the state is no longer a number"),
+    case_arrays.STORM: (
+        EventStorm,
+        f"more than {case_arrays.STORM_EVENTS} switches within {case_arrays.STORM_TIME * 1e3:g} ms",
+    ),
+    case_arrays.NO_STEP: (StepFailure, "no step that meets the tolerance was found"),
+    case_arrays.ROWS_FULL: (StepFailure, "the record is full"),
+    case_arrays.TOO_STIFF: (
+        StepFailure,
+        "far more steps than a motion of its length takes",
+    ),
+    case_arrays.TOO_FAST: (
+        StepFailure,
+        "a part of the motion is so fast that its metrics take more than a million nodes of a single step; lower "
+        "the controller's gains or bandwidth, or raise the inertia",
+    ),
+}
+
+
+class Choice(NamedTuple):
+    """The integrator for a case: its name, its ``run``, and why those that "auto" tries before it cannot run it."""
+
+    name: str
+    run: Any
+    refused: Mapping[str, str]
+
+
+def integrator_for(case: Case, name: str = "auto", without: Mapping[str, str] | None = None) -> Choice:
+    """That integrator, or the first that can run the case, those left out that `without` gives a reason against;
+    `InputError` if none can."""
+    if name != "auto":
+        if name not in INTEGRATORS:
+            raise UnknownName("integrator", name, (*INTEGRATORS, "auto"))
+        module = importlib.import_module(f"stickslip.simulation.{name}.engine")
+        if why := module.can_run(case):
+            raise InputError(f"the {name} integrator cannot run this: {why}")
+        return Choice(name, module.run, {})
+    refused: dict[str, str] = dict(without or {})
+    for candidate in (c for c in INTEGRATORS if c not in refused):
+        module = importlib.import_module(f"stickslip.simulation.{candidate}.engine")
+        why = module.can_run(case)
+        if not why:
+            return Choice(candidate, module.run, refused)
+        refused[candidate] = why
+    raise InputError(
+        "no integrator can run this (" + "; ".join(f"{k}: {why}" for k, why in refused.items()) + ")"
+    )
+
+
+class Integrated(NamedTuple):
+    """What ran a case, how it ended, and why not those that "auto" takes before it."""
+
+    name: str
+    outcome: Outcome
+    refused: Mapping[str, str]
+
+
+def integrated(case: Case, integrator: str, time_step: float) -> Integrated:
+    """Run a case by that integrator; by "auto" with the next one that can where one finds no step.
+
+    Where none comes to the end, the outcome is that of the one that came farthest.
+    """
+    runs: list[Integrated] = []
+    refused: Mapping[str, str] = {}
+    while True:
+        name, run, refused = integrator_for(case, integrator, refused)
+        if name == "fixed":
+            insist_on_steps("time_step", time_step, float(case.numbers[case_arrays.DURATION]))
+        outcome: Outcome = run(case, time_step) if name == "fixed" else run(case)
+        runs.append(Integrated(name, outcome, refused))
+        if integrator != "auto" or outcome.code not in NO_STEPS or name == INTEGRATORS[-1]:
+            break
+        refused = {**refused, name: f"ended at {outcome.time:.6g} s: {REASONS[outcome.code][1]}"}
+    return runs[-1] if runs[-1].outcome.code == case_arrays.DONE else max(runs, key=lambda r: r.outcome.time)
+
+
+def without_tolerance(meta: Mapping[str, Any], time_step: float) -> str:
+    """What is said where "auto" was left with fixed steps; else ""."""
+    if meta["integrator"] != "fixed" or not (refused := meta.get("refused")):
+        return ""
+    why = refused.get("adaptive", next(iter(refused.values()))).split("; use the fixed")[0]
+    return (
+        f"the fixed integrator ran this, whose steps of {time_step:g} s keep no tolerance ({why}); compare with a "
+        "tenth of the time_step"
+    )
+
+
+def insist_on_steps(name: str, step: float, duration: float) -> None:
+    """Refuse more steps than a computer takes within an hour or so; every integrator bounds its own besides.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not (step > 0.0 and duration / step <= MOST_STEPS):
+        count = duration / step if step > 0.0 else math.inf
+        raise ParameterError(
+            f"simulate: {name} = {step:g} s makes {count:.3g} steps of {duration:g} s, {MOST_STEPS:g} at most; use a "
+            "longer one or a shorter duration"
+        )
+
+
+def reason(case: Case, name: str, outcome: Outcome) -> tuple[type[SimulationError], str]:
+    """The error of a run that ended early, and why it did, with what to try."""
+    kind, why = REASONS[outcome.code]
+    if outcome.code == case_arrays.TOO_STIFF:
+        why += _in_numbers(case, outcome)
+    if outcome.code not in NO_STEPS or name == "fixed":
+        return kind, why
+    remedies = [f"a tolerance above {case.numbers[case_arrays.TOLERANCE]:g} rad"]
+    if case.numbers[case_arrays.SAMPLE_TIME] == 0.0:
+        remedies += ['integrator="adaptive"'] if name == "exact" else []
+        remedies.append("or use the fixed integrator")
+    return kind, f"{why}; try {', '.join(remedies)}"
+
+
+def _in_numbers(case: Case, outcome: Outcome) -> str:
+    """What a run that took too many steps would have taken, and what to do."""
+    steps = outcome.counts["steps"]
+    duration = float(case.numbers[case_arrays.DURATION])
+    whole = f"some {steps * duration / outcome.time:.2g}" if outcome.time > 0.0 else "no number of them"
+    return (
+        f", {steps:,} so far; at this pace {duration:g} s take {whole}: friction is too stiff for the inertia, or the "
+        f"reference too fast; check them or give a shorter duration"
+    )
