@@ -15,7 +15,7 @@ from stickslip import plugins
 from stickslip.control.belief import believed
 from stickslip.control.catalogue import CATALOGUE, compensated
 from stickslip.control.files import read_controller
-from stickslip.errors import ParameterError, UnknownName
+from stickslip.errors import InputError, ParameterError, UnknownName
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
@@ -146,6 +146,10 @@ def test_what_is_wrong_is_said_in_a_line():
     assert compensators_of(("all",)) == tuple(CATALOGUE)
     with pytest.raises(UnknownName, match="unknown compensator 'dobs'; did you mean 'dob'"):
         compensators_of(("dobs",))
+    with pytest.raises(
+        InputError, match="compensators dob,all: 'all' stands alone; give it without the others"
+    ):
+        compensators_of(("dob", "all"))
     loop = compensated("dob", "PD", belief_of(known(**THESIS).model, Drive(amplitude=0.1), 4e-4))
     with pytest.raises(ParameterError, match="bring their own loop; leave controller out"):
         belief_of(known(**THESIS).model, Drive(amplitude=0.1, controller=loop), 4e-4)

@@ -43,7 +43,7 @@ def describing(model: Model, amplitude: float, frequency: float) -> LinearContac
     """
     for name, value, unit in (("amplitude", amplitude, "rad"), ("frequency", frequency, "Hz")):
         if not (value > 0.0 and math.isfinite(value)):
-            raise ParameterError(f"stability: {name} = {value:g} {unit} must be greater than 0")
+            raise ParameterError(f"stability: {name} = {value:g} {unit} must be greater than 0 and finite")
     w = 2.0 * math.pi * frequency
     # Half-way between zeros of the velocity: a law that jumps there is taken on either side.
     steps = np.arange(-1, 2 * STEPS)
@@ -103,7 +103,9 @@ class Drive:
 
     def __post_init__(self) -> None:
         if not (self.sample_time > 0.0 and math.isfinite(self.sample_time)):
-            raise ParameterError(f"stability: sample_time = {self.sample_time:g} s must be greater than 0")
+            raise ParameterError(
+                f"stability: sample_time = {self.sample_time:g} s must be greater than 0 and finite"
+            )
         if not 0.0 <= self.delay <= 100.0:
             raise ParameterError(f"stability: delay = {self.delay:g} samples must be from 0 to 100")
 

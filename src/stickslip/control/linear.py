@@ -109,7 +109,7 @@ def place(kind: str, inertia: float, bandwidth: float, damping: float = 1.0) -> 
     """
     for name, value in (("inertia", inertia), ("bandwidth", bandwidth), ("damping", damping)):
         if not value > 0.0 or not math.isfinite(value):
-            raise ParameterError(f"controller: {name} = {value:g} must be greater than 0")
+            raise ParameterError(f"controller: {name} = {value:g} must be greater than 0 and finite")
     w = 2.0 * math.pi * bandwidth
     if kind == "PR":
         return pr(inertia * w * w, 2.0 * inertia * damping * w)

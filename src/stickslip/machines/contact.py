@@ -40,7 +40,9 @@ class Bearings:
             if not (value >= 0.0 and math.isfinite(value)):
                 raise ParameterError(f"bearings: {name} = {value:g} must be a finite number of at least 0")
         if not (self.stiffness > 0.0 and math.isfinite(self.stiffness)):
-            raise ParameterError(f"bearings: stiffness = {self.stiffness:g} N·m/rad must be greater than 0")
+            raise ParameterError(
+                f"bearings: stiffness = {self.stiffness:g} N·m/rad must be greater than 0 and finite"
+            )
 
 
 @dataclass(frozen=True)

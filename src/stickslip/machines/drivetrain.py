@@ -34,7 +34,7 @@ def all_positive(owner: str, name: str, values: Sequence[float], unit: str) -> N
     """Refuse numbers of which one is not positive."""
     for value in values:
         if not (value > 0.0 and math.isfinite(value)):
-            raise ParameterError(f"{owner}: {name} = {value:g} {unit} must be greater than 0")
+            raise ParameterError(f"{owner}: {name} = {value:g} {unit} must be greater than 0 and finite")
 
 
 @dataclass(frozen=True, eq=False)

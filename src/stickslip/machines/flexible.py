@@ -41,7 +41,9 @@ class FlexibleAxis:
         ):  # fmt: skip
             value = getattr(self, name)
             if not (value > 0.0 and math.isfinite(value)):
-                raise ParameterError(f"flexible axis: {name} = {value:g} {unit} must be greater than 0")
+                raise ParameterError(
+                    f"flexible axis: {name} = {value:g} {unit} must be greater than 0 and finite"
+                )
         if not 0.0 <= self.damping < 1.0:
             raise ParameterError(
                 f"flexible axis: damping = {self.damping:g} must be at least 0 and less than 1"

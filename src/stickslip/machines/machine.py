@@ -100,7 +100,9 @@ class Machine:
     def __post_init__(self) -> None:
         insist_on_own(self, "machine")
         if not (self.inertia > 0.0 and math.isfinite(self.inertia)):
-            raise ParameterError(f"machine: inertia = {self.inertia:g} kg·m² must be greater than 0")
+            raise ParameterError(
+                f"machine: inertia = {self.inertia:g} kg·m² must be greater than 0 and finite"
+            )
         if self.flexible and abs(self.flexible.inertia / self.inertia - 1.0) > 1e-6:
             raise ParameterError(
                 f"machine: rotor, shaft and disk add up to {self.flexible.inertia:g} kg·m², not to inertia = "
@@ -109,7 +111,9 @@ class Machine:
         if not 0.0 <= self.delay <= 1.0:
             raise ParameterError(f"machine: delay = {self.delay:g} samples must be from 0 to 1")
         if not (self.sample_time > 0.0 and math.isfinite(self.sample_time)):
-            raise ParameterError(f"machine: sample_time = {self.sample_time:g} s must be greater than 0")
+            raise ParameterError(
+                f"machine: sample_time = {self.sample_time:g} s must be greater than 0 and finite"
+            )
         if not math.isfinite(self.start_angle):
             raise ParameterError(f"machine: start_angle = {self.start_angle:g} rad must be a finite number")
         self._positive_up_to_its_speed()

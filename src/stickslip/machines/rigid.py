@@ -35,7 +35,7 @@ class RigidAxis:
     def __post_init__(self) -> None:
         insist_on_own(self, "axis")
         if not math.isfinite(self.inertia) or self.inertia <= 0.0:
-            raise ParameterError(f"axis: inertia = {self.inertia:g} kg·m² must be greater than 0")
+            raise ParameterError(f"axis: inertia = {self.inertia:g} kg·m² must be greater than 0 and finite")
         if not (math.isfinite(self.load) and self.load >= 0.0):
             raise ParameterError(f"axis: load = {self.load:g} must be a finite number of at least 0")
         if not math.isfinite(self.temperature):

@@ -26,7 +26,7 @@ def positive(owner: str, name: str, value: Any, unit: str) -> None:
     if not is_number(value):
         raise no_number(owner, name, value, unit)
     if not (value > 0.0 and math.isfinite(value)):
-        raise ParameterError(f"{owner}: {name} = {value:g} {unit} must be greater than 0")
+        raise ParameterError(f"{owner}: {name} = {value:g} {unit} must be greater than 0 and finite")
 
 
 @dataclass(frozen=True)

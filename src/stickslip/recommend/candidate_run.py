@@ -108,8 +108,10 @@ class Drive:
         insist_on_own(self, "drive")
         for name in ("bandwidth", "damping", "sample_time", "torque_limit", "amplitude", "frequency"):
             value = getattr(self, name)
-            if value is not None and not value > 0.0:
-                raise ParameterError(f"drive: {name} = {value:g} must be greater than 0")
+            endless = name == "torque_limit"
+            if value is not None and not (value > 0.0 and (endless or math.isfinite(value))):
+                said = "" if endless else " and finite"
+                raise ParameterError(f"drive: {name} = {value:g} must be greater than 0{said}")
         for name in ("encoder_counts", "velocity_filter"):
             if not getattr(self, name) >= 0.0:
                 raise ParameterError(f"drive: {name} = {getattr(self, name):g} must be 0 or greater")

@@ -196,14 +196,16 @@ def inertia_of(found: Identified, given: float | None) -> float:
     Raises
     ------
     InputError
-        If there is none, or it is not greater than 0.
+        If there is none, or it is not greater than 0 and finite.
     """
     j = given if given is not None else found.axis.get("inertia")
     unit = found.unit("kg·m²")
     if j is None:
         raise InputError(f"{found.path} holds no inertia; give --inertia in {unit}")
     if not 0.0 < j < math.inf:
-        raise InputError(f"inertia = {j:g} {unit} must be greater than 0; give another one with --inertia")
+        raise InputError(
+            f"inertia = {j:g} {unit} must be greater than 0 and finite; give another one with --inertia"
+        )
     return float(j)
 
 

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 from stickslip.approval import allow_code
 from stickslip.arguments import arguments_checked
@@ -28,7 +28,13 @@ from stickslip.verbs.compare import IdentifiedModel, identified_of
 from stickslip.verbs.reading import Log, open_log
 from stickslip.verbs.recommendation import RecommendationResult
 
-USUAL = {"loop": None, "linear": "PD", "bandwidth": 10.0, "damping": 1.0, "sample_time": None}
+USUAL: Mapping[str, Any] = {
+    "loop": None,
+    "linear": "PD",
+    "bandwidth": 10.0,
+    "damping": 1.0,
+    "sample_time": None,
+}
 """What `recommend` takes where nothing is given."""
 
 
@@ -36,8 +42,8 @@ USUAL = {"loop": None, "linear": "PD", "bandwidth": 10.0, "damping": 1.0, "sampl
 def recommend(
     model: IdentifiedModel,
     *,
-    bandwidth: float = 10.0,
-    damping: float = 1.0,
+    bandwidth: float | None = 10.0,
+    damping: float | None = 1.0,
     linear: Literal["PD", "PID", "PR"] = "PD",
     loop: str | Mapping[str, float] | None = None,
     controller: Controller | str | os.PathLike[str] | None = None,
@@ -65,8 +71,9 @@ def recommend(
     ----------
     model : IdentificationResult or path
         What `identify` gave, or the model.toml that it saved.
-    bandwidth, damping : float
-        Of the position loop's poles, Hz and -. Refused beside `loop` and `controller`, which have their gains.
+    bandwidth, damping : float, optional
+        Of the position loop's poles, Hz and -; None: 10 Hz and 1. Refused beside `loop` and `controller`, which have
+        their gains.
     linear : {"PD", "PID", "PR"}
         What they place.
     loop : str or mapping, optional
@@ -114,6 +121,8 @@ def recommend(
     InputError
         One line that names the thing, its value and the remedy.
     """
+    bandwidth = float(USUAL["bandwidth"]) if bandwidth is None else bandwidth
+    damping = float(USUAL["damping"]) if damping is None else damping
     refuse_numbers(axes, confirm)
     refuse_together(motion, amplitude, frequency)
     if loop is not None:
@@ -221,9 +230,15 @@ def compensators_of(names: Sequence[str]) -> tuple[str, ...]:
     ------
     UnknownName
         If there is none of a name.
+    InputError
+        If "all" stands beside another name.
     """
     if tuple(names) == ("all",):
         return tuple(CATALOGUE)
+    if "all" in names:
+        raise InputError(
+            f"--compensators {','.join(names)}: 'all' stands alone; give it without the others, or leave it out"
+        )
     for name in names:
         if name not in CATALOGUE:
             raise UnknownName("compensator", name, (*CATALOGUE, "all"))
