@@ -20,6 +20,7 @@ from stickslip.identify.identified_file import Identified
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
+from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.recommend import beside
 from stickslip.recommend import recommend as recommending
@@ -32,6 +33,7 @@ from stickslip.simulation.closed_loop import simulate
 from stickslip.study.bench_decision import CHATTER
 from stickslip.study.bench_metrics import judged
 from stickslip.verbs.recommend import compensators_of
+from stickslip.verbs.recommend import recommend as recommend_verb
 
 REFUSED = ("lee-kim", "twisting-implicit", "sliding-mode", "friedland-park", "rbf", "dither")
 """What the reference found not worth switching on."""
@@ -150,6 +152,12 @@ def test_what_is_wrong_is_said_in_a_line():
         InputError, match="compensators dob,all: 'all' stands alone; give it without the others"
     ):
         compensators_of(("dob", "all"))
+    # None is what is not given: only the loop is found wanting.
+    with pytest.raises(InputError, match="loop: '' names no gain"):
+        recommend_verb("m.toml", bandwidth=None, damping=None, loop="")
+    for made in (lambda: Drive(math.inf), lambda: RigidAxis(math.nan, known(**THESIS).model)):
+        with pytest.raises(ParameterError, match="must be greater than 0 and finite"):
+            made()
     loop = compensated("dob", "PD", belief_of(known(**THESIS).model, Drive(amplitude=0.1), 4e-4))
     with pytest.raises(ParameterError, match="bring their own loop; leave controller out"):
         belief_of(known(**THESIS).model, Drive(amplitude=0.1, controller=loop), 4e-4)
