@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 import types
-from collections.abc import Callable, Mapping, Sequence
+from collections import namedtuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, ClassVar, Self, cast
 
 from stickslip.arguments import arguments_checked, no_number
 from stickslip.description import Choice, Field, Option, fields_of, packed
 from stickslip.errors import ParameterError, UnknownName, suggestion
+from stickslip.origin import Findable
 from stickslip.rules import is_number
 
 
-class Described:
+class Described(Findable):
     """Something with a name and described parameters: a law, a reference."""
 
     name: str
@@ -86,6 +89,7 @@ class Described:
 class Configurable(Described):
     """Something described that has choices and a state: a friction law, a control law."""
 
+    Params: type
     kind: ClassVar[str] = ""
     """What it is called in messages."""
     choices: tuple[Choice, ...]
@@ -94,6 +98,16 @@ class Configurable(Described):
     written: Mapping[str, Any]
     state_fields: tuple[Field, ...]
     example: Mapping[str, Any]
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        plain = self.variants.get((), self)
+        return super().__reduce__() if plain is self else (_with_options, (plain, dict(self.chosen)))
+
+    @property
+    def called(self) -> str:
+        """What finds it: its name, or the path of its file."""
+        plain = self.variants.get((), self)
+        return plain.path or plain.name
 
     def __repr__(self) -> str:
         chosen = "".join(f", {k}={v!r}" for k, v in self.chosen.items())
@@ -106,6 +120,13 @@ class Configurable(Described):
             for f in fields_of(part):
                 fields.setdefault(f.name, f)
         return fields
+
+    def parameters_kind(self, names: Iterable[str]) -> Any:
+        """The type of this law's parameters; a pickle finds it by the law."""
+        make: Any = namedtuple  # whose fields are not known to a type checker
+        kind = make(self.Params.__name__, list(names))
+        kind.__reduce__ = lambda p: (_parameters, (self, tuple(p)))
+        return kind
 
     def try_example(self) -> None:
         """Refuse parameters of the example that cannot be.
@@ -143,12 +164,16 @@ class Configurable(Described):
 
     def option_of(self, choice: str) -> str:
         """The name of the option in force for a choice; "" where the law has no choice of that name."""
-        defaults = {c.name: c.default for c in self.choices}
-        return self.chosen.get(choice, defaults.get(choice, ""))
+        return self.chosen.get(choice, self._defaults.get(choice, ""))
+
+    @functools.cached_property
+    def _defaults(self) -> dict[str, str]:
+        """The default options by the names of the choices."""
+        return {choice.name: choice.default for choice in self.choices}
 
     @arguments_checked
     def having(self, **names: str) -> Self:
-        """Return this with other options, ``law.having(slip_rule="literal")``.
+        """Return this with other options, ``law.having(slip_rule="literal")``; equal options give the same object.
 
         Parameters
         ----------
@@ -166,9 +191,12 @@ class Configurable(Described):
                 raise UnknownName(f"choice of {self.kind} {self.name!r}", name, known)
             if option not in known[name].options:
                 raise UnknownName(name.replace("_", " "), option, known[name].options)
-        key = tuple(sorted({**self.chosen, **names}.items()))
+        wanted = {**self.chosen, **names}.items()
+        key = tuple(sorted((name, option) for name, option in wanted if option != self._defaults[name]))
+        if not self.chosen:
+            self.variants.setdefault((), self)
         if key not in self.variants:
-            self.variants[key] = self._rewritten(chosen=dict(key))
+            self.variants.setdefault(key, self._rewritten(chosen=dict(key)))
         return self.variants[key]
 
     def offering(self, choices: Sequence[Choice]) -> Self:
@@ -202,3 +230,13 @@ class Configurable(Described):
             if f.per_element:
                 flat.extend(getattr(z, f.name))
         return flat
+
+
+def _with_options(plain: Configurable, chosen: Mapping[str, str]) -> Configurable:
+    """A law with its options, as a pickle says it."""
+    return plain.having(**chosen)
+
+
+def _parameters(law: Configurable, values: tuple[Any, ...]) -> Any:
+    """Parameters of a law, as a pickle says them."""
+    return law.Parameters(*values)

@@ -30,7 +30,6 @@ velocity.
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from dataclasses import fields as dataclass_fields
@@ -167,13 +166,12 @@ class ControlLaw(Configurable):
         written = {f.name: getattr(self, f.name) for f in dataclass_fields(self) if f.init}
         chosen = [self.option(choice) for choice in self.choices]
         fields, scope = self.option_fields(self.Params), self.option_scope()
-        make: Any = namedtuple  # whose fields are not known to a type checker
         checks = [f for f in (self.check, *(o.check for o in chosen)) if f]
         parts: dict[str, Any] = {
             "written": written,
             "fields": tuple(fields.values()),
             "state_fields": fields_of(self.State),
-            "Parameters": make(self.Params.__name__, list(fields)),
+            "Parameters": self.parameters_kind(fields),
             "example": self.option_examples(self.example, fields),
             "check": first_complaint(checks),
             **{

@@ -28,9 +28,9 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stickslip.record import Record
@@ -61,6 +61,10 @@ __all__ = [
 
 class StickslipError(Exception):
     """Base of every error this package raises on purpose."""
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]:
+        # Constructors of some take more than the message: a pool of processes could not hand these back, and hang.
+        return _error, (type(self), self.args), vars(self)
 
 
 class InputError(StickslipError):
@@ -176,6 +180,11 @@ class EventStorm(SimulationError):
 
 class StepFailure(SimulationError):
     """No step that meets the tolerance was found."""
+
+
+def _error(kind: type[StickslipError], args: tuple[Any, ...]) -> StickslipError:
+    """An error as a pickle says it."""
+    return kind.__new__(kind, *args)
 
 
 def suggestion(name: str, known: Iterable[str], otherwise: str = "") -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,6 +16,7 @@ from stickslip.arguments import arguments_checked
 from stickslip.config import Table, read_toml
 from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
 from stickslip.spec import Law, ReferenceKind
+from stickslip.values import call_of
 
 MODEL_FORMAT = "stickslip-model-1"
 """What a file that `stickslip identify` wrote says it is."""
@@ -42,6 +43,11 @@ class Model:
     ------
     UnknownName, ParameterError
         One line that names the thing, its value and the remedy.
+
+    Notes
+    -----
+    Two are equal where law, choices and parameters are. A pickle names the law, or holds the path and the text of its
+    file, so that other processes run the same one.
 
     Warns
     -----
@@ -144,8 +150,24 @@ class Model:
         return {"law": self.law.name, **dict(self.law.chosen), **_plain(self.parameters)}
 
     def __repr__(self) -> str:
-        inside = ", ".join(f"{k}={v!r}" for k, v in self.parameters._asdict().items())
-        return f"Model({self.law.name!r}, {inside})"
+        chosen = [("choices", dict(self.law.chosen))] if self.law.chosen else []
+        return call_of("Model", [self.law.called], [*chosen, *self.parameters._asdict().items()])
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Model):
+            return NotImplemented
+        return self.law is other.law and self.parameters == other.parameters
+
+    def __hash__(self) -> int:
+        return hash((self.law, self.parameters))
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return _model, (self.law, self.parameters._asdict())
+
+
+def _model(law: Law, values: Mapping[str, Any]) -> Model:
+    """A model as a pickle says it; what is remarkable of it was said where it was made."""
+    return Model(law, **values)
 
 
 def _called_from_within() -> bool:
@@ -237,6 +259,22 @@ class Reference:
     def __repr__(self) -> str:
         inside = ", ".join(f"{k}={_short(v)}" for k, v in self.parameters._asdict().items())
         return f"Reference({self.kind.name!r}, {inside})"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Reference):
+            return NotImplemented
+        return self.kind is other.kind and self.parameters == other.parameters
+
+    def __hash__(self) -> int:
+        return hash((self.kind, self.parameters))
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return _reference, (self.kind, self.parameters._asdict())
+
+
+def _reference(kind: ReferenceKind, values: Mapping[str, Any]) -> Reference:
+    """A reference as a pickle says it."""
+    return Reference(kind, **values)
 
 
 def _short(value: Any) -> str:

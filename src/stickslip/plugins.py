@@ -22,6 +22,7 @@ from typing import Any
 from stickslip import approval, trial
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError, LawError, UnknownName
+from stickslip.origin import TEXT
 from stickslip.spec import COMPILED, Law, ReferenceKind
 from stickslip.subset import law_layouts, lower
 
@@ -50,11 +51,11 @@ def law(name: str, named_by: str = "") -> Law:
     if name.endswith(".py"):
         return law_in(*code_at(str(Path(name).resolve()), named_by))
     if name in importlib.import_module("stickslip.laws").LAWS:
-        return completed(importlib.import_module(f"stickslip.laws.{name}").LAW)
+        return completed(importlib.import_module(f"stickslip.laws.{name}").LAW).coming_from(law, name)
     if name in (files := _from_files()):
         return files[name]
     if name in (others := installed("stickslip.laws")):
-        return _tried(others[name].load(), f"installed law {name!r}")
+        return _tried(others[name].load(), f"installed law {name!r}").coming_from(law, name)
     raise UnknownName("law", name, law_names())
 
 
@@ -63,7 +64,8 @@ def completed(law: Law) -> Law:
     """The law with the choices that any law has: other parameters for v < 0, modulations."""
     places = [name.split(".") for name in importlib.import_module("stickslip.laws").COMMON_CHOICES]
     common = [getattr(importlib.import_module(f"stickslip.laws.{module}"), name) for module, name in places]
-    return law.offering(common)
+    made = law.offering(common)
+    return made if made is law else made.coming_from(completed, law)
 
 
 @functools.cache
@@ -88,9 +90,9 @@ def reference_kind(name: str) -> ReferenceKind:
     """
     if name in importlib.import_module("stickslip.references").REFERENCES:
         found: ReferenceKind = importlib.import_module(f"stickslip.references.{name}").REFERENCE
-        return found
+        return found.coming_from(reference_kind, name)
     if name in (others := installed("stickslip.references")):
-        return others[name].load()
+        return others[name].load().coming_from(reference_kind, name)
     raise UnknownName("reference", name, reference_names())
 
 
@@ -108,11 +110,12 @@ def _from_files() -> dict[str, Law]:
 
 @functools.cache
 def law_in(path: str, code: bytes) -> Law:
-    """The friction law in a file; `LawError` if there is none, or it is wrong."""
+    """The friction law in a file of this content, which the file may not have any more; `LawError` if there is none, or
+    it is wrong."""
     found = getattr(defined_in(path, code), "LAW", None)
     if not isinstance(found, Law):
         raise LawError(f"{path} defines no law; end it with `LAW = Law(...)`")
-    return _tried(found, path)
+    return _tried(found, path).coming_from(law_in, path, code, path=path)
 
 
 @functools.cache
@@ -145,6 +148,7 @@ def module_of(path: str, code: bytes) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
+    module.__dict__[TEXT] = code  # What is compiled is what ran, though the file may be another one by then, or gone.
     sys.modules[name] = module
     try:
         exec(compile(code, path, "exec", dont_inherit=True), module.__dict__)

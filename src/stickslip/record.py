@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
 from stickslip.errors import InputError, suggestion, unwritable
+from stickslip.values import same
 
 if TYPE_CHECKING:
     import pandas
@@ -35,6 +36,10 @@ class Record:
     meta : mapping
         What was run or measured, when, with which machine, versions and seed; metrics and energies of a
         simulation. Plain data: it is saved as JSON.
+
+    Notes
+    -----
+    Two are equal where times, channels, units and meta are, NaN where NaN is.
     """
 
     time: Array
@@ -57,6 +62,13 @@ class Record:
             return self.channels[name]
         except (KeyError, TypeError):
             raise InputError(f"no channel {name!r}; {suggestion(str(name), self.channels)}") from None
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Record):
+            return NotImplemented
+        return all(same(getattr(self, f.name), getattr(other, f.name)) for f in fields(Record))
+
+    __hash__ = None  # Its arrays may be changed in place.
 
     def __len__(self) -> int:
         return int(self.time.size)

@@ -37,7 +37,6 @@ velocity, as in J dv/dt = T_m - T_f (thesis eq. 3.1).
 from __future__ import annotations
 
 import functools
-from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from dataclasses import fields as dataclass_fields
@@ -198,13 +197,12 @@ class Law(Configurable):
             fields.update(
                 {(twin := f.twin(ending)).name: twin for f in [*fields.values()] if f.par.directional}
             )
-        make: Any = namedtuple  # whose fields are not known to a type checker
         scope = self.option_scope()
         parts: dict[str, Any] = {
             "written": written,
             "fields": tuple(fields.values()),
             "state_fields": fields_of(self.State),
-            "Parameters": make(self.Params.__name__, list(fields)),
+            "Parameters": self.parameters_kind(fields),
             "example": self.option_examples(self.example, fields),
             **{name: bound(getattr(self, name), scope) for name in FUNCTIONS},
         }

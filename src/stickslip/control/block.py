@@ -15,6 +15,7 @@ from stickslip.control_spec import ControlLaw
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 from stickslip.spec import Field, Law
+from stickslip.values import call_of
 
 HELD = "friction"
 """The part of a block's state and parameters that is the friction law's."""
@@ -122,15 +123,38 @@ class ControlBlock:
         return {"law": self.law.name, **dict(self.law.chosen), **self.own, **held}
 
     def __repr__(self) -> str:
-        inside = "".join(f", {k}={v!r}" for k, v in self.as_dict().items() if k not in ("law", HELD))
-        held = f", friction={self.friction!r}" if self.friction else ""
-        return f"ControlBlock({self.law.name!r}{held}{inside})"
+        held = [("friction", self.friction)] if self.friction else []
+        chosen = [("choices", dict(self.law.chosen))] if self.law.chosen else []
+        return call_of("ControlBlock", [self.law.called], [*held, *chosen, *self.own.items()])
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ControlBlock):
+            return NotImplemented
+        return (self.law, self.friction, self.parameters) == (other.law, other.friction, other.parameters)
+
+    def __hash__(self) -> int:
+        return hash((self.law, self.friction, self.parameters))
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return _block, (self.law, self.friction, self.own)
+
+
+def _block(law: ControlLaw, friction: Model | None, values: Mapping[str, Any]) -> ControlBlock:
+    """A block as a pickle says it."""
+    return ControlBlock(law, friction, **values)
 
 
 @functools.cache
 def parameters_of(names: tuple[str, ...]) -> Any:
     """The type of a block's parameters: made once, as it takes longer than all the rest of a block."""
-    return namedtuple("Parameters", names)  # type: ignore[reportUntypedNamedTuple]
+    kind: Any = namedtuple("Parameters", names)  # type: ignore[reportUntypedNamedTuple]
+    kind.__reduce__ = lambda p: (_parameters, (names, tuple(p)))
+    return kind
+
+
+def _parameters(names: tuple[str, ...], values: tuple[Any, ...]) -> Any:
+    """A block's parameters as a pickle says them."""
+    return parameters_of(names)(*values)
 
 
 @functools.lru_cache(maxsize=1024)

@@ -12,11 +12,12 @@ from typing import Any, ClassVar
 from stickslip.arguments import constructor_named, insist_on_own
 from stickslip.errors import ParameterError
 from stickslip.model import Model
+from stickslip.values import making, standard_of
 
 MOST_SUBSTEPS = 1000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Compensator:
     """A friction law driven by a velocity.
 
@@ -83,6 +84,9 @@ class Compensator:
                 f"{self.name}: lead = {self.lead:g} s needs the reference velocity; leave it out, or use a feedforward"
             )
 
+    def __repr__(self) -> str:
+        return making(self, standard_of(Compensator))
+
     @property
     def sampled(self) -> tuple[str, ...]:
         """The names of what is set and acts on samples only."""
@@ -98,7 +102,7 @@ class Compensator:
 
 
 @constructor_named
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Feedforward(Compensator):
     """T_hat = gain * law(reference velocity). Its state depends on time alone.
 
@@ -132,7 +136,7 @@ class Feedforward(Compensator):
 
 
 @constructor_named
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Feedback(Compensator):
     """T_hat = gain * law(measured velocity).
 

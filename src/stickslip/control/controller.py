@@ -18,14 +18,20 @@ from stickslip.control.short_form import laws_meant, refuse_short
 from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.errors import ParameterError
 from stickslip.model import Model
+from stickslip.values import making
 
 Blocks = ControlBlock | Sequence[ControlBlock] | None
+STANDARD = {
+    "gains": None, "compensator": None, "torque_limit": math.inf, "sample_time": 0.0, "encoder_counts": 0.0,
+    "velocity_filter": 0.0, "loop": (), "feedforward": (), "observer": (), "estimator": None, "alone": False,
+}  # fmt: skip
+"""What a controller's fields are where nobody gives them"""
 MANY = ("feedforward", "observer", "loop")
 """Places in which several laws may stand; their torques are summed."""
 
 
 @constructor_named
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True, init=False, repr=False)
 class Controller(Composed):
     """A controller that acts every sample time and holds its torque in between, or in continuous time.
 
@@ -255,6 +261,9 @@ class Controller(Composed):
         return replace(self, gains=self.gains._replace(**own))
 
     # ---- for people --------------------------------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        return making(self, STANDARD)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data that says everything about it."""

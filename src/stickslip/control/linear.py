@@ -15,6 +15,7 @@ from typing import Annotated, NamedTuple
 from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.errors import ParameterError
 from stickslip.spec import Par
+from stickslip.values import making
 
 
 @constructor_checked
@@ -29,6 +30,14 @@ class Gains(NamedTuple):
     kr: Annotated[
         float, Par("N·m·s/rad", "k_r", "gain on the reference velocity", lower=0.0, default=0.0)
     ] = 0.0
+
+    def __repr__(self) -> str:
+        return making(self, Gains._field_defaults)
+
+    def __eq__(self, other: object) -> bool:
+        return not isinstance(other, Cascade) and tuple.__eq__(self, other)
+
+    __hash__ = tuple.__hash__
 
 
 @constructor_checked
@@ -48,6 +57,14 @@ class Cascade(NamedTuple):
     feed: Annotated[float, Par("-", "", "part of the reference velocity that is fed forward", lower=0.0)] = (
         1.0
     )
+
+    def __repr__(self) -> str:
+        return making(self, Cascade._field_defaults)
+
+    def __eq__(self, other: object) -> bool:
+        return not isinstance(other, Gains) and tuple.__eq__(self, other)
+
+    __hash__ = tuple.__hash__
 
     @property
     def pid(self) -> Gains:

@@ -42,9 +42,9 @@ def control_law(name: str, named_by: str = "") -> ControlLaw:
     for folder, names in BUILT_IN.items():
         if name in names:
             found: ControlLaw = importlib.import_module(f"{folder}.{name}").CONTROL_LAW
-            return found
+            return found.coming_from(control_law, name)
     if name in (others := plugins.installed("stickslip.control_laws")):
-        return others[name].load()
+        return others[name].load().coming_from(control_law, name)
     raise UnknownName("control law", name, control_law_names())
 
 
@@ -79,4 +79,4 @@ def _control_law_in(path: str, code: bytes) -> ControlLaw:
     found = getattr(plugins.defined_in(path, code), "CONTROL_LAW", None)
     if not isinstance(found, ControlLaw):
         raise LawError(f"{path} defines no control law; end it with `CONTROL_LAW = ControlLaw(...)`")
-    return found
+    return found.coming_from(_control_law_in, path, code, path=path)

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from stickslip.arguments import constructor_named, insist_on_own
 from stickslip.errors import ParameterError
 from stickslip.model import Model
+from stickslip.values import making, standard_of
 
 
 @constructor_named
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RigidAxis:
     """One inertia with friction.
 
@@ -40,3 +41,6 @@ class RigidAxis:
             raise ParameterError(f"axis: load = {self.load:g} must be a finite number of at least 0")
         if not math.isfinite(self.temperature):
             raise ParameterError(f"axis: temperature = {self.temperature:g} °C must be a finite number")
+
+    def __repr__(self) -> str:
+        return making(self, standard_of(RigidAxis))

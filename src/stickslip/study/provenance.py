@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import stickslip
+from stickslip.origin import TEXT
 
 WITHOUT_PHYSICS = ("analyse", "cli", "report", "study", "sweep")
 """Folders of the package that cannot change a run's numbers."""
@@ -36,7 +37,10 @@ def engine_hash() -> str:
 @functools.cache
 def source_hash(module: str) -> str:
     """SHA-256 of the file of an imported module (a law's file, say); empty where it has none."""
-    path = getattr(sys.modules.get(module), "__file__", None)
+    found = sys.modules.get(module)
+    text, path = getattr(found, TEXT, None), getattr(found, "__file__", None)
+    if text is not None:
+        return hashlib.sha256(text).hexdigest()
     return file_hash(Path(path)) if path else ""
 
 

@@ -9,9 +9,11 @@ import textwrap
 import types
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.util import decode_source
 from typing import Any
 
 from stickslip.errors import LawError
+from stickslip.origin import TEXT
 
 VARIADIC = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
 
@@ -29,7 +31,7 @@ def source_of(function: Callable[..., Any]) -> tuple[str, Place]:
     """The text of a function and where it stands."""
     try:
         code = function.__code__
-        return _source_of(code, code.co_filename)
+        return _source_of(code, code.co_filename, function.__globals__.get(TEXT))
     except (AttributeError, OSError, TypeError) as error:
         name = getattr(function, "__name__", str(function))
         raise LawError(
@@ -38,11 +40,14 @@ def source_of(function: Callable[..., Any]) -> tuple[str, Place]:
 
 
 @functools.lru_cache(maxsize=4096)
-def _source_of(code: types.CodeType, file: str) -> tuple[str, Place]:
+def _source_of(code: types.CodeType, file: str, text: bytes | None) -> tuple[str, Place]:
     """By the code, which copies with other globals share: to find its end, Python reads it token by token.
 
-    Code of two files may be equal, and their comments and places are not.
+    Code of two files may be equal, and their comments and places are not. Of a law's file it is the `text` that ran.
     """
+    if text is not None:
+        lines = [f"{line}\n" for line in decode_source(text).split("\n")[code.co_firstlineno - 1 :]]
+        return textwrap.dedent("".join(inspect.getblock(lines))), Place(file, code.co_firstlineno)
     lines, first = inspect.getsourcelines(code)
     return textwrap.dedent("".join(lines)), Place(inspect.getsourcefile(code) or "<unknown>", max(first, 1))
 

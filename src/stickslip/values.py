@@ -1,0 +1,46 @@
+"""Things by their values: the text that makes one again, and whether two hold the same."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, cast
+
+import numpy as np
+
+
+def call_of(name: str, first: Sequence[object], named: Iterable[tuple[str, object]]) -> str:
+    """A call as code: what is given by its place, then by its name."""
+    said = [*(text_of(value) for value in first), *(f"{key}={text_of(value)}" for key, value in named)]
+    return f"{name}({', '.join(said)})"
+
+
+def text_of(value: object) -> str:
+    """A value as code; NumPy's numbers as Python's."""
+    return repr(float(value)) if isinstance(value, float) else repr(value)
+
+
+def making(thing: Any, standard: Mapping[str, object]) -> str:
+    """A dataclass or named tuple as the call that makes it, without what is `standard`."""
+    names = thing._fields if isinstance(thing, tuple) else [f.name for f in dataclasses.fields(thing)]
+    named = ((name, getattr(thing, name)) for name in cast("Iterable[str]", names))
+    return call_of(type(thing).__name__, (), [(k, v) for k, v in named if k not in standard or v != standard[k]])
+
+
+def standard_of(kind: Any) -> dict[str, object]:
+    """The defaults of a dataclass's fields."""
+    return {f.name: f.default for f in dataclasses.fields(kind) if f.default is not dataclasses.MISSING}
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two hold the same: arrays element by element, NaN and NaN, mappings whatever their order."""
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        a, b = cast("Mapping[Any, Any]", one), cast("Mapping[Any, Any]", other)
+        return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
+    if isinstance(one, (list, tuple)) and isinstance(other, (list, tuple)):
+        x, y = cast("Sequence[Any]", one), cast("Sequence[Any]", other)
+        return len(x) == len(y) and all(same(v, w) for v, w in zip(x, y))
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        v, w = cast("Any", np.asarray(one)), cast("Any", np.asarray(other))
+        return v.shape == w.shape and bool(np.all((v == w) | ((v != v) & (w != w))))
+    return bool(one == other) or bool(one != one and other != other)
