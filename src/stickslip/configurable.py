@@ -125,7 +125,11 @@ class Configurable(Described):
         """The type of this law's parameters; a pickle finds it by the law."""
         make: Any = namedtuple  # whose fields are not known to a type checker
         kind = make(self.Params.__name__, list(names))
-        kind.__reduce__ = lambda p: (_parameters, (self, tuple(p)))
+
+        def reduced(p: tuple[Any, ...]) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+            return _parameters, (self, tuple(p))
+
+        kind.__reduce__ = reduced
         return kind
 
     def try_example(self) -> None:

@@ -9,6 +9,7 @@ are looked up in `stickslip.control.registry`, kinds of rig in `stickslip.rigs.k
 from __future__ import annotations
 
 import functools
+import hashlib
 import importlib
 import importlib.util
 import os
@@ -144,11 +145,14 @@ def code_at(path: str, named_by: str = "") -> tuple[str, bytes]:
 
 def module_of(path: str, code: bytes) -> ModuleType:
     """Run these bytes: no other content of the file, and no compiled one that lies beside it."""
-    name = f"stickslip_file_{Path(path).stem}_{abs(hash(path)):x}"
+    digest = hashlib.sha256(path.encode(errors="surrogateescape") + b"\0" + code).hexdigest()
+    name = f"stickslip_file_{Path(path).stem}_{digest[:16]}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
-    module.__dict__[TEXT] = code  # What is compiled is what ran, though the file may be another one by then, or gone.
+    module.__dict__[TEXT] = (
+        code  # What is compiled is what ran, though the file may be another one by then, or gone.
+    )
     sys.modules[name] = module
     try:
         exec(compile(code, path, "exec", dont_inherit=True), module.__dict__)

@@ -68,8 +68,6 @@ class Record:
             return NotImplemented
         return all(same(getattr(self, f.name), getattr(other, f.name)) for f in fields(Record))
 
-    __hash__ = None  # Its arrays may be changed in place.
-
     def __len__(self) -> int:
         return int(self.time.size)
 

@@ -22,9 +22,11 @@ def text_of(value: object) -> str:
 
 def making(thing: Any, standard: Mapping[str, object]) -> str:
     """A dataclass or named tuple as the call that makes it, without what is `standard`."""
-    names = thing._fields if isinstance(thing, tuple) else [f.name for f in dataclasses.fields(thing)]
-    named = ((name, getattr(thing, name)) for name in cast("Iterable[str]", names))
-    return call_of(type(thing).__name__, (), [(k, v) for k, v in named if k not in standard or v != standard[k]])
+    names: Iterable[str] = getattr(thing, "_fields", None) or [f.name for f in dataclasses.fields(thing)]
+    named = ((name, getattr(thing, name)) for name in names)
+    return call_of(
+        type(thing).__name__, (), [(k, v) for k, v in named if k not in standard or v != standard[k]]
+    )
 
 
 def standard_of(kind: Any) -> dict[str, object]:
@@ -32,7 +34,7 @@ def standard_of(kind: Any) -> dict[str, object]:
     return {f.name: f.default for f in dataclasses.fields(kind) if f.default is not dataclasses.MISSING}
 
 
-def same(one: Any, other: Any) -> bool:
+def same(one: object, other: object) -> bool:
     """Whether two hold the same: arrays element by element, NaN and NaN, mappings whatever their order."""
     if isinstance(one, Mapping) and isinstance(other, Mapping):
         a, b = cast("Mapping[Any, Any]", one), cast("Mapping[Any, Any]", other)
@@ -41,6 +43,6 @@ def same(one: Any, other: Any) -> bool:
         x, y = cast("Sequence[Any]", one), cast("Sequence[Any]", other)
         return len(x) == len(y) and all(same(v, w) for v, w in zip(x, y))
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
-        v, w = cast("Any", np.asarray(one)), cast("Any", np.asarray(other))
+        v, w = np.asarray(cast("Any", one)), np.asarray(cast("Any", other))
         return v.shape == w.shape and bool(np.all((v == w) | ((v != v) & (w != w))))
     return bool(one == other) or bool(one != one and other != other)

@@ -148,7 +148,11 @@ def _block(law: ControlLaw, friction: Model | None, values: Mapping[str, Any]) -
 def parameters_of(names: tuple[str, ...]) -> Any:
     """The type of a block's parameters: made once, as it takes longer than all the rest of a block."""
     kind: Any = namedtuple("Parameters", names)  # type: ignore[reportUntypedNamedTuple]
-    kind.__reduce__ = lambda p: (_parameters, (names, tuple(p)))
+
+    def reduced(p: tuple[Any, ...]) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return _parameters, (names, tuple(p))
+
+    kind.__reduce__ = reduced
     return kind
 
 

@@ -35,9 +35,14 @@ class Gains(NamedTuple):
         return making(self, Gains._field_defaults)
 
     def __eq__(self, other: object) -> bool:
-        return not isinstance(other, Cascade) and tuple.__eq__(self, other)
+        # As tuples, a PID and a cascade of the same four numbers would be one.
+        return not isinstance(other, Cascade) and self[:] == other
 
-    __hash__ = tuple.__hash__
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __hash__(self) -> int:
+        return hash(self[:])
 
 
 @constructor_checked
@@ -62,9 +67,14 @@ class Cascade(NamedTuple):
         return making(self, Cascade._field_defaults)
 
     def __eq__(self, other: object) -> bool:
-        return not isinstance(other, Gains) and tuple.__eq__(self, other)
+        # As tuples, a PID and a cascade of the same four numbers would be one.
+        return not isinstance(other, Gains) and self[:] == other
 
-    __hash__ = tuple.__hash__
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __hash__(self) -> int:
+        return hash(self[:])
 
     @property
     def pid(self) -> Gains:

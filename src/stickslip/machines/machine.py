@@ -131,6 +131,9 @@ class Machine:
                         f"machine: friction helps the motion at {v:g} rad/s; lower encoder.max_speed or fix friction"
                     )
 
+    def __hash__(self) -> int:
+        return hash((self.name, self.inertia, self.contact, self.seed))  # Its mappings have none.
+
     @property
     def friction(self) -> Model:
         """The whole friction of the axis as its motor sees it."""

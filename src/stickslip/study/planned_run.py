@@ -7,7 +7,7 @@ import hashlib
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from stickslip.control.controller import Controller
@@ -54,6 +54,10 @@ class PlannedRun:
     motion: Reference
     duration: float
     numerics: Numerics
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the fingerprint: another process finds its own, of its own version of the package."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @property
     def key(self) -> str:

@@ -10,16 +10,14 @@ import pickle
 import platform
 import re
 import signal
-import tempfile
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from stickslip.approval import allow_code
 from stickslip.capacity import insist_on_jobs, insist_on_memory
 from stickslip.errors import InputError
 from stickslip.simulation.many import simd_batch
@@ -27,7 +25,7 @@ from stickslip.study.files import claim_folder, save_manifest
 from stickslip.study.study import interrupts_between_runs
 from stickslip.sweep import dataset
 from stickslip.sweep.block import Block, compute, integrator_of
-from stickslip.sweep.plan import BLOCK, Sweep, load
+from stickslip.sweep.plan import BLOCK, Sweep
 
 ADDRESS = re.compile(r"(?:[a-z]+://)?(?:[^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):\d{1,5}/?|inproc://\S+")
 """Of a Dask scheduler: its client looks for another kind of text in vain, and for long."""
@@ -35,8 +33,6 @@ PATIENCE = 10.0
 """s that a scheduler has to answer."""
 MOST_TRIES = 5
 """So often workers may be killed before the command gives up; what is done is kept."""
-MAY_CHANGE = ("drawn", "metrics", "check", "step", "device")
-"""Of a sweep, since it was read."""
 Progress = Callable[[int, int], None]
 
 
@@ -251,53 +247,39 @@ def _cluster(scheduler: str) -> Generator[dict[str, Any]]:
 
 @dataclass(frozen=True)
 class Parcel:
-    """A sweep's files, so that another process or machine can load it.
+    """A sweep for another process or machine: its pickle, whose laws are names, or the texts of their files.
 
     Attributes
     ----------
-    name : str
-        Of the sweep's own file.
-    files : tuple of (str, str, bytes)
-        Path as written, name and content, of that file and of all that it and its study refer to.
-    changed : bytes
-        What was changed since they were read, such as the number of cases.
+    sweep : bytes
     fingerprints : tuple of str
         Of the runs.
     """
 
-    name: str
-    files: tuple[tuple[str, str, bytes], ...]
-    changed: bytes
+    sweep: bytes
     fingerprints: tuple[str, ...]
 
     @staticmethod
     def of(sweep: Sweep) -> Parcel:
         """Pack a sweep."""
-        everything = {sweep.source.name: sweep.source, **sweep.study.files, **sweep.files}
-        named = ((w, f"{i}-{p.name}", p.read_bytes()) for i, (w, p) in enumerate(everything.items()))
-        changed = pickle.dumps({name: getattr(sweep, name) for name in MAY_CHANGE})
-        return Parcel(sweep.source.name, tuple(named), changed, fingerprints(sweep))
+        return Parcel(pickle.dumps(sweep), fingerprints(sweep))
 
     def load(self) -> Sweep:
-        """Unpack it, and load it from there.
+        """Unpack it.
 
         Raises
         ------
         InputError
             If another version of this package runs here.
         """
-        folder = Path(tempfile.mkdtemp(prefix="stickslip-sweep-"))
-        for _, name, content in self.files:
-            (folder / name).write_bytes(content)
-        moved = {written: folder / name for written, name, _ in self.files[1:]}
-        with allow_code():  # Who packed it has read it, code and all.
-            sweep = replace(load(folder / self.files[0][1], moved), **pickle.loads(self.changed))
-        if fingerprints(sweep) != self.fingerprints:
-            raise InputError(
-                f"a worker on {platform.node()} would compute other numbers: install the same version of stickslip "
-                "there"
-            )
-        return sweep
+        # Another version has other parts.
+        with suppress(AttributeError, ImportError, TypeError, InputError):
+            sweep: Sweep = pickle.loads(self.sweep)
+            if fingerprints(sweep) == self.fingerprints:
+                return sweep
+        raise InputError(
+            f"a worker on {platform.node()} would compute other numbers: install the same version of stickslip there"
+        )
 
 
 def fingerprints(sweep: Sweep) -> tuple[str, ...]:
