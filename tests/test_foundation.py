@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -183,3 +184,19 @@ def test_the_function_is_not_hidden_by_a_folder():
     code = "import stickslip.simulation.closed_loop, stickslip; print(stickslip.simulate.__name__)"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "simulate"
+
+
+def test_values_per_element_may_be_arrays():
+    k, others = np.array([1000, 2000]), {"alpha": (0.5, 0.5), "c": 24.0, "fs": 0.335, "fc": 0.285, "vs": 0.01}
+    model = Model("gms", k=k, **others)
+    assert model == Model("gms", k=[1000.0, 2000.0], **others)
+    assert all(type(value) is float for value in model.parameters.k)
+    for wrong, shape in ((k.reshape(1, 2), r"\(1, 2\)"), (k[:0], r"\(0,\)"), (np.array(3.0), r"\(\)")):
+        with pytest.raises(
+            ParameterError, match=f"gms: k has the shape {shape}; give one number per element"
+        ):
+            Model("gms", k=wrong, **others)
+
+
+def test_type_checkers_are_told_that_the_package_is_typed():
+    assert Path(stickslip.__file__).with_name("py.typed").is_file()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -132,7 +134,39 @@ def test_bad_references_are_refused():
         Reference("sine", amplitude=1.0, frequency=0.0)
     with pytest.raises(ParameterError, match=r"time\[1\]"):
         Reference("table", time=[0.0, 0.0], position=[0.0, 1.0], velocity=[0.0, 0.0])
-    with pytest.raises(ParameterError, match="time must ascend"):
+    with pytest.raises(ParameterError, match=r"time\[2\] = 1 s must come after time\[1\] = 1 s"):
         Reference.table([0.0, 1.0, 1.0], [0.0, 1.0, 2.0])
     with pytest.raises(ParameterError, match="whole number"):
         Reference("staircase", height=0.1, dwell=1.0, steps=2.5)
+
+
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        (
+            ([0.0, 2.0, 1.0], [0.0] * 3),
+            r"time\[2\] = 1 s must come after time\[1\] = 2 s; sort the rows by time",
+        ),
+        (([0.0, 1.0, 1.0], [0.0] * 3), r"time\[2\] = 1 s must come after .*; leave one of both rows out"),
+        (([0.0, math.nan, 1.0], [0.0] * 3), r"time\[1\] = nan s must be a finite number"),
+        (([0.0, 1.0], [0.0, -math.inf]), r"position\[1\] = -inf rad must be a finite number"),
+        (([0.0, 1.0], [0.0, 1.0], [0.0, math.nan]), r"velocity\[1\] = nan rad/s must be a finite number"),
+        ((np.zeros((2, 2)), np.zeros((2, 2))), r"time has the shape \(2, 2\); give one number a point"),
+        ((np.arange(4.0), np.zeros((4, 1))), r"position has the shape \(4, 1\)"),
+        (([0.0, 1.0], [0.0, 1.0, 2.0]), "time has 2 values and position 3; give as many of each"),
+        (([0.0], [0.0]), "at least two points"),
+        (([0.0, 1.0], [0.0, 1.0], [0.0]), "time has 2 values and velocity 1"),
+        ((["0", 1.0], [0.0, 1.0]), r"time\[0\] = '0' must be a number"),
+        ((np.array([None, 1.0]), [0.0, 1.0]), r"time\[0\] = nan|holds what is no number"),
+    ],
+)
+def test_a_table_that_cannot_be_names_the_row(points, said):
+    """One line for all of them named neither row nor value."""
+    with pytest.raises(ParameterError, match=said):
+        Reference.table(*points)
+
+
+def test_a_table_takes_arrays_of_any_kind():
+    lists = Reference.table([0, 1, 2], [0.0, 0.1, 0.3])
+    assert Reference.table(np.arange(3), np.array([0.0, 0.1, 0.3])) == lists
+    assert Reference.table(pandas.Series([0, 1, 2]), (0.0, 0.1, 0.3)) == lists

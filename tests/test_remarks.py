@@ -7,8 +7,12 @@ import warnings
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import ModelRemark
-from stickslip.model import Model
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Cascade, Gains
+from stickslip.errors import ModelRemark, ParameterError
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model, Reference
+from stickslip.simulation.closed_loop import simulate
 
 RISING = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.2, "fc": 0.285, "vs": 0.01}
 FALLING = {**RISING, "fs": 0.335}
@@ -80,3 +84,49 @@ def test_no_exchange_is_proposed_for_what_was_identified(tmp_path):
     file.write_text(f'law = "lugre"\n[parameters]\n{toml(RISING)}\n')
     with pytest.warns(ModelRemark, match="exchange them"):
         Model.from_file(file)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        ({"sample_time": 1e-3, "velocity_filter": 1e4}, "velocity_filter = 10000 Hz hardly filters"),
+        ({"sample_time": 1.0}, "sample_time = 1 s is slow for a drive; a millisecond is 0.001 s"),
+    ],
+)
+def test_numbers_of_a_controller_that_are_hardly_meant(numbers, said):
+    with pytest.warns(ModelRemark, match=said) as caught:
+        controller = Controller(Gains(kp=1.0), **numbers)
+    assert caught[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Controller(Gains(kp=1.0), sample_time=1e-3, velocity_filter=400.0)
+        controller.with_numbers({"kp": 2.0})
+
+
+def test_a_file_says_it_too(tmp_path, capsys):
+    (tmp_path / "run.toml").write_text(
+        RUN.format(friction='law = "coulomb"\nfc = 0.1') + "sample_time = 1e-3\nvelocity_filter = 1e4\n"
+    )
+    assert main(["simulate", str(tmp_path / "run.toml"), "--out", str(tmp_path / "run.npz")]) == 0
+    assert capsys.readouterr().err.count("velocity_filter = 10000 Hz hardly filters") == 1
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Gains(kp=-3.0), "Gains: kp = -3 N·m/rad must be at least 0"),
+        (lambda: Cascade(1.0, -1.0), "Cascade: kvp = -1 N·m·s/rad must be at least 0"),
+        (lambda: Gains(kp=float("inf")), "Gains: kp = inf N·m/rad must be a finite number"),
+        (lambda: Controller(Gains(1.0), sample_time=1e-3, encoder_counts=0.5), "encoder_counts = 0.5 must be"),
+        (
+            lambda: simulate(
+                RigidAxis(1e-3, Model("coulomb", fc=0.1)), Controller(Gains(1.0)),
+                Reference("sine", amplitude=0.1, frequency=1.0), 0.1, output=[],
+            ),
+            "output holds no times",
+        ),
+    ],
+)  # fmt: skip
+def test_what_has_no_meaning_is_refused(make, said):
+    with pytest.raises(ParameterError, match=said):
+        make()

@@ -1,5 +1,10 @@
 """stickslip: friction of servo axes, simulated under control and compensated.
 
+From a log to a compensator: `read`, `doctor`, `identify`, `compare`, `recommend`, `export`. Simulation: `Model`,
+`RigidAxis`, `load_machine`, `Controller`, `Reference`, `simulate`, `respond`. Many runs: `sweep`, `tune`, `learn`. Each
+has its own help, `help(stickslip.identify)`; `identify`, `recommend`, `export` and `sweep` are packages as well, and so
+stand under PACKAGE CONTENTS rather than FUNCTIONS.
+
 The public names below are loaded when first used, so that importing the package costs nothing.
 """
 

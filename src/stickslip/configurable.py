@@ -54,6 +54,13 @@ class Described(Findable):
                 f"{self.name}: parameter {f.name!r} ({f.par.meaning}, {f.par.unit}) is missing"
             )
         if f.per_element:
+            # Of an array, or of a data frame's column
+            shape = getattr(value, "shape", None)
+            if shape is not None and not (len(shape) == 1 and shape[0]):
+                raise ParameterError(
+                    f"{self.name}: {f.name} has the shape {tuple(shape)}; give one number per {f.par.per}, shape (n,)"
+                )
+            value = value.tolist() if shape is not None else value
             if isinstance(value, str) or not isinstance(value, Sequence):
                 raise ParameterError(
                     f"{self.name}: {f.name} = {value!r} must be a list, one number per {f.par.per}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,8 +15,11 @@ from stickslip import plugins
 from stickslip.arguments import arguments_checked
 from stickslip.config import Table, read_toml
 from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
+from stickslip.rules import Vector
 from stickslip.spec import Law, ReferenceKind
 from stickslip.values import call_of
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
 
 MODEL_FORMAT = "stickslip-model-1"
 """What a file that `stickslip identify` wrote says it is."""
@@ -62,7 +65,7 @@ class Model:
         found = plugins.law(law) if isinstance(law, str) else plugins.completed(law)
         self.law: Law = found.having(**choices) if choices else found
         self.parameters: Any = self.law.parameters(parameters)
-        if (words := self.law.remark(self.parameters)) and not _called_from_within():
+        if (words := self.law.remark(self.parameters)) and not called_from_within():
             warnings.warn(words, ModelRemark, stacklevel=3)
 
     @arguments_checked
@@ -170,11 +173,13 @@ def _model(law: Law, values: Mapping[str, Any]) -> Model:
     return Model(law, **values)
 
 
-def _called_from_within() -> bool:
-    """Whether the package itself makes the model: a fit tries many that nobody has written."""
+def called_from_within() -> bool:
+    """Whether the package itself called the constructor that asks: a fit tries many models that nobody has written."""
     frame = inspect.currentframe()
     for _ in range(3):  # this function, the constructor, what checks its arguments
         frame = frame.f_back if frame else None
+    while frame is not None and frame.f_globals.get("__name__") == "dataclasses":  # `replace`
+        frame = frame.f_back
     return frame is not None and str(frame.f_globals.get("__name__", "")).startswith("stickslip.")
 
 
@@ -212,22 +217,25 @@ class Reference:
 
     @classmethod
     @arguments_checked
-    def table(
-        cls, time: Sequence[float], position: Sequence[float], velocity: Sequence[float] | None = None
-    ) -> Reference:
+    def table(cls, time: Vector, position: Vector, velocity: Vector | None = None) -> Reference:
         """A reference through points.
 
         Parameters
         ----------
-        time, position : sequence of float, shape (n,)
+        time, position : array_like, shape (n,)
             s, ascending; rad.
-        velocity : sequence of float, shape (n,), optional
+        velocity : array_like, shape (n,), optional
             rad/s; if left out, of a cubic that does not overshoot the points and starts and ends at rest.
+
+        Raises
+        ------
+        ParameterError
+            One line that names the first row that cannot be: a number that is none or not finite, or a time that does
+            not come after the one before; or shapes that do not fit.
         """
-        if velocity is None:
-            velocity = monotone_velocities(time, position)
-        return cls("table", **{k: [float(x) for x in v] for k, v in
-                               (("time", time), ("position", position), ("velocity", velocity))})  # fmt: skip
+        t, x = points(time, position)
+        v = monotone_velocities(t, x) if velocity is None else column("velocity", velocity, "rad/s", t.size)
+        return cls("table", time=t, position=x, velocity=v)
 
     @arguments_checked
     def breaks(self, duration: float) -> list[float]:
@@ -241,14 +249,14 @@ class Reference:
         return sorted(t for t in self.kind.breaks(self.parameters, duration) if 0.0 < t < duration)
 
     @arguments_checked
-    def sample(self, time: Sequence[float] | np.ndarray[Any, Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    def sample(self, time: Vector) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Position (rad), velocity (rad/s) and acceleration (rad/s²), shape (n, 3), at each `time` (s)."""
         from types import SimpleNamespace
 
         out = SimpleNamespace(position=0.0, velocity=0.0, acceleration=0.0)
         rows: list[tuple[float, float, float]] = []
-        for t in time:
-            self.kind.profile(float(t), self.parameters, out)
+        for t in np.asarray(time, dtype=np.float64).reshape(-1).tolist():
+            self.kind.profile(t, self.parameters, out)
             rows.append((out.position, out.velocity, out.acceleration))
         return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
@@ -285,24 +293,65 @@ def _short(value: Any) -> str:
     return f"<{len(numbers)} numbers, {min(numbers):g} to {max(numbers):g}>"
 
 
-def monotone_velocities(time: Sequence[float], position: Sequence[float]) -> tuple[float, ...]:
+def column(name: str, values: Vector, unit: str, rows: int = 0) -> Array:
+    """A column of a table of points, of so many rows (0: of any number).
+
+    Raises
+    ------
+    ParameterError
+    """
+    try:
+        found: Array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"table: {name} holds what is no number; give one number a point, in {unit}"
+        ) from None
+    if found.ndim != 1:
+        raise ParameterError(
+            f"table: {name} has the shape {found.shape}; give one number a point, shape (n,)"
+        )
+    if rows and found.size != rows:
+        raise ParameterError(f"table: time has {rows} values and {name} {found.size}; give as many of each")
+    odd = np.flatnonzero(~np.isfinite(found))
+    if odd.size:
+        raise ParameterError(
+            f"table: {name}[{odd[0]}] = {found[odd[0]]:g} {unit} must be a finite number; leave the row out"
+        )
+    return found
+
+
+def points(time: Vector, position: Vector) -> tuple[Array, Array]:
+    """Times (s) and positions (rad) of a table of points.
+
+    Raises
+    ------
+    ParameterError
+    """
+    t = column("time", time, "s")
+    x = column("position", position, "rad", t.size)
+    if t.size < 2:
+        raise ParameterError(f"table: time has {t.size} values; give at least two points")
+    late = np.flatnonzero(np.diff(t) <= 0.0)
+    if late.size:
+        i = int(late[0]) + 1
+        remedy = "leave one of both rows out" if t[i] == t[i - 1] else "sort the rows by time"
+        raise ParameterError(
+            f"table: time[{i}] = {t[i]:.9g} s must come after time[{i - 1}] = {t[i - 1]:.9g} s; {remedy}"
+        )
+    return t, x
+
+
+def monotone_velocities(t: Array, x: Array) -> Array:
     """Velocities at the points of a piecewise cubic that does not overshoot them, rad/s.
 
     Fritsch and Butland's weighted harmonic mean of the slopes on both sides; 0 at a turning point, along a dwell
     and at both ends, so that the motion starts and ends at rest.
     """
-    t, x = np.asarray(time, float), np.asarray(position, float)
-    if t.shape != x.shape or t.ndim != 1 or t.size < 2:
-        raise ParameterError(
-            f"table: time has {t.size} values and position {x.size}; give as many of each, at least 2"
-        )
     h = np.diff(t)
-    if not np.all(np.isfinite(x)) or not np.all(np.isfinite(t)) or np.any(h <= 0.0):
-        raise ParameterError("table: time must ascend and every number must be finite; correct the table")
     slope = np.diff(x) / h
     before, after = slope[:-1], slope[1:]
     same = before * after > 0.0
     w1, w2 = 2.0 * h[1:] + h[:-1], h[1:] + 2.0 * h[:-1]
     inner = np.zeros(max(t.size - 2, 0))
     inner[same] = (w1 + w2)[same] / (w1[same] / before[same] + w2[same] / after[same])
-    return (0.0, *(float(v) for v in inner), 0.0)
+    return np.concatenate([[0.0], inner, [0.0]])

@@ -68,7 +68,7 @@ STUDY = [
     ('file = "motion.csv"', 'file = "nowhere.csv"', "nowhere.csv"),
     ('file = "motion.csv"', 'file = "small_study.toml"', "small_study.toml"),
     ('file = "motion.csv"', "time = [0.0, 0.1]\nposition = [0.0]", "references.points"),
-    ('file = "motion.csv"', "time = [0.0, 0.0]\nposition = [0.0, 1.0]", "time must ascend"),
+    ('file = "motion.csv"', "time = [0.0, 0.0]\nposition = [0.0, 1.0]", "time[1] = 0 s must come after time[0] = 0 s"),
     ('file = "motion.csv"', "time = [0.0, 0.1]\nposition = [0.0, nan]", "references.points.position"),
     ('linear = "PD"', 'linear = "PDD"', "controllers.PD.linear"),
     ('linear = "PD"', "", "controllers.PD.linear is missing"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, cast
@@ -16,8 +17,8 @@ from stickslip.control.continuous import Continuous, continuous_form, refuse_win
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.short_form import laws_meant, refuse_short
 from stickslip.control_spec import PLACES, ControlLaw
-from stickslip.errors import ParameterError
-from stickslip.model import Model
+from stickslip.errors import ModelRemark, ParameterError
+from stickslip.model import Model, called_from_within
 from stickslip.values import making
 
 Blocks = ControlBlock | Sequence[ControlBlock] | None
@@ -26,6 +27,8 @@ STANDARD = {
     "velocity_filter": 0.0, "loop": (), "feedforward": (), "observer": (), "estimator": None, "alone": False,
 }  # fmt: skip
 """What a controller's fields are where nobody gives them"""
+SLOW_SAMPLE = 0.1
+"""s, from which on a sample time was probably given in ms."""
 MANY = ("feedforward", "observer", "loop")
 """Places in which several laws may stand; their torques are summed."""
 
@@ -68,6 +71,11 @@ class Controller(Composed):
     ------
     ParameterError
         If a law does not belong where it is given, or a number is out of bounds.
+
+    Warns
+    -----
+    ModelRemark
+        Where its numbers are allowed but seldom meant (`remark`).
     """
 
     gains: Gains | Cascade | None
@@ -106,6 +114,8 @@ class Controller(Composed):
         refuse_short(gains, compensator, velocity_filter, sample_time)
         if not self.is_short:
             self._refuse_laws()
+        if (words := self.remark) and not called_from_within():
+            warnings.warn(f"controller: {words}", ModelRemark, stacklevel=3)
 
     def _refuse_numbers(self) -> None:
         insist_on_own(self, "controller")
@@ -117,10 +127,28 @@ class Controller(Composed):
             raise ParameterError(f"controller: sample_time = {self.sample_time:g} s must be at least 0")
         if not (math.isfinite(self.encoder_counts) and self.encoder_counts >= 0.0):
             raise ParameterError(f"controller: encoder_counts = {self.encoder_counts:g} must be at least 0")
+        if 0.0 < self.encoder_counts < 1.0:
+            raise ParameterError(
+                f"controller: encoder_counts = {self.encoder_counts:g} must be at least 1; 0 measures exactly"
+            )
         if self.encoder_counts > 0.0 and self.sample_time == 0.0:
             raise ParameterError(
                 "controller: encoder_counts needs a sampled controller; give a sample_time greater than 0"
             )
+
+    @property
+    def remark(self) -> str:
+        """What is allowed in its numbers but seldom meant, in a sentence; "" where there is nothing."""
+        said: list[str] = []
+        if self.sample_time >= SLOW_SAMPLE:
+            said.append(f"sample_time = {self.sample_time:g} s is slow for a drive; a millisecond is 0.001 s")
+        nyquist = 0.5 / self.sample_time if self.sample_time > 0.0 else math.inf
+        if self.velocity_filter > nyquist:
+            said.append(
+                f"velocity_filter = {self.velocity_filter:g} Hz hardly filters, as it lies above half the sample rate, "
+                f"{nyquist:g} Hz; give a lower corner, or 0 for none"
+            )
+        return "; ".join(said)
 
     def _refuse_laws(self) -> None:
         for place in PLACES:

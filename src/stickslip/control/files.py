@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -35,7 +36,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.registry import control_law, control_law_names, law_files
 from stickslip.control.short_tables import OF_GAINS, Placement, compensator_in, gains_in, placement
 from stickslip.control_spec import PLACES, ControlLaw
-from stickslip.errors import ConfigError, suggestion
+from stickslip.errors import ConfigError, ModelRemark, suggestion
 from stickslip.model import Model
 from stickslip.model_tables import models
 
@@ -118,7 +119,7 @@ def composed(
         raise table.error("estimator", "must be one table; a controller has one velocity")
     short = not is_composed(table)
     with table.blamed():
-        return Controller(
+        made = Controller(
             gains_in(table, inertia, poles) if short or any(map(table.has, OF_GAINS)) else None,
             compensator_in(table, known),
             table.positive("torque_limit", "N·m") if table.has("torque_limit") else math.inf,
@@ -128,6 +129,9 @@ def composed(
             estimator=estimator[0] if estimator else None,
             **places,
         )
+    if made.remark:
+        warnings.warn(f"{table.label()}: {made.remark}", ModelRemark, stacklevel=2)
+    return made
 
 
 def listed(table: Table, place: str) -> Iterator[Table]:

@@ -9,18 +9,41 @@ Besides the cascade of most drives, position P around velocity PI (`Cascade`).
 
 from __future__ import annotations
 
+import functools
 import math
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.errors import ParameterError
-from stickslip.spec import Par
+from stickslip.rules import is_number
+from stickslip.spec import Par, fields_of
 from stickslip.values import making
+
+K = TypeVar("K")
+
+
+def _bounded(kind: type[K]) -> type[K]:
+    """A named tuple of gains whose constructor refuses what is out of bounds: a negative gain drives the axis away."""
+    inner: Any = kind.__new__
+
+    @functools.wraps(inner)
+    def new(cls: Any, *args: Any, **kwargs: Any) -> Any:
+        made = inner(cls, *args, **kwargs)
+        for f, value in zip(fields_of(kind), made):
+            # What is no number is refused by its annotation, or by whatever calculates with it.
+            if is_number(value) and (complaint := f.par.complaint(float(value))):
+                unit = "" if f.par.unit == "-" else f" {f.par.unit}"
+                raise ParameterError(f"{kind.__name__}: {f.name} = {value:g}{unit} {complaint}")
+        return made
+
+    kind.__new__ = new
+    return kind
 
 
 @constructor_checked
+@_bounded
 class Gains(NamedTuple):
-    """Gains of the linear controller."""
+    """Gains of the linear controller, none negative."""
 
     kp: Annotated[float, Par("N·m/rad", "k_p", "proportional gain", lower=0.0)]
     ki: Annotated[float, Par("N·m/(rad·s)", "k_i", "integral gain", lower=0.0, default=0.0)] = 0.0
@@ -46,6 +69,7 @@ class Gains(NamedTuple):
 
 
 @constructor_checked
+@_bounded
 class Cascade(NamedTuple):
     """Position P around velocity PI, as drives have it; only with a sample time.
 

@@ -72,7 +72,7 @@ def check(p: Any) -> str:
     """Times ascend."""
     for i in range(1, len(p.time)):
         if p.time[i] <= p.time[i - 1]:
-            return f"time[{i}] = {p.time[i]:g} s does not come after time[{i - 1}] = {p.time[i - 1]:g} s"
+            return f"time[{i}] = {p.time[i]:.9g} s must come after time[{i - 1}] = {p.time[i - 1]:.9g} s"
     return "" if len(p.time) > 1 else "a table needs at least two points"
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import importlib
 import math
 import warnings
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.record import Record
+from stickslip.rules import Vector
 from stickslip.simulation import case_arrays
 from stickslip.simulation.case_arrays import COLUMNS, UNITS, Case, Outcome, lay_out, slip_rules
 from stickslip.simulation.integrators import insist_on_steps, integrated, reason, without_tolerance
@@ -44,7 +45,7 @@ def simulate(
     tolerance: float = 1e-9,
     time_step: float = 1e-4,
     slip_rule: str | None = None,
-    output: float | Sequence[float] | np.ndarray[Any, Any] = 1e-3,
+    output: float | Vector = 1e-3,
     initial: tuple[float, float] = (0.0, 0.0),
     metered: bool = True,
     check: bool = False,
@@ -108,6 +109,8 @@ def simulate(
         Where "auto" is left with the fixed integrator, whose steps keep no tolerance.
     """
     _insist_on_tolerance(tolerance)
+    if np.size(output) == 0:
+        raise ParameterError("simulate: output holds no times; give a spacing or times, s")
     if isinstance(axis, Machine):
         check_machine_run(
             axis, controller, duration, output, integrator, initial=initial, slip_rule=slip_rule
@@ -175,7 +178,7 @@ def prepare(
     *,
     tolerance: float = 1e-9,
     slip_rule: str | None = None,
-    output: float | Sequence[float] | np.ndarray[Any, Any] = 1e-3,
+    output: float | Vector = 1e-3,
     initial: tuple[float, float] = (0.0, 0.0),
     metered: bool = True,
 ) -> Case:
@@ -239,7 +242,7 @@ def _insist_on_tolerance(tolerance: float) -> None:
         raise ParameterError(f"simulate: tolerance = {tolerance:g} rad must be greater than 0 and finite")
 
 
-def _grid(output: float | Sequence[float] | np.ndarray[Any, Any], duration: float) -> Any:
+def _grid(output: float | Vector, duration: float) -> Any:
     """The times at which rows are wanted."""
     if isinstance(output, (int, float)):
         if not (math.isfinite(output) and output > 0.0):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from stickslip.errors import InputError, StepFailure, UnknownName
 from stickslip.jit import compiled_profile, flat
 from stickslip.model import Model, Reference
 from stickslip.record import Record
+from stickslip.rules import Vector
 from stickslip.simulation.case_arrays import Side, ruled, slip_rules
 from stickslip.simulation.prescribed.kernels import Motion, march
 from stickslip.spec import Surroundings
@@ -26,13 +26,13 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 def respond(
     model: Model,
     reference: Reference,
-    times: Sequence[float] | Array,
+    times: Vector,
     *,
     slip_rule: str | None = None,
     method: str = "auto",
     tolerance: float = 1e-10,
     surroundings: Surroundings | None = None,
-    applied: Sequence[float] | Array | None = None,
+    applied: Vector | None = None,
 ) -> Record:
     """Move a contact along a reference, from rest with all states zero at t = 0.
 
@@ -108,7 +108,7 @@ def respond(
     return record
 
 
-def checked(times: Sequence[float] | Array) -> Array:
+def checked(times: Vector) -> Array:
     """The times as an array; refuses what does not ascend from 0 on."""
     time = np.ascontiguousarray(times, dtype=np.float64)
     if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(np.diff(time) < 0.0) or np.any(time < 0.0):
@@ -116,7 +116,7 @@ def checked(times: Sequence[float] | Array) -> Array:
     return time
 
 
-def applied_torques(applied: Sequence[float] | Array | None, time: Array) -> Array:
+def applied_torques(applied: Vector | None, time: Array) -> Array:
     """The applied torque at the times, N·m; 0 where none is given."""
     if applied is None:
         return np.zeros(time.size)
