@@ -15,9 +15,8 @@ from stickslip import plugins
 from stickslip.arguments import arguments_checked
 from stickslip.config import Table, read_toml
 from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
-from stickslip.rules import Vector
 from stickslip.spec import Law, ReferenceKind
-from stickslip.values import call_of
+from stickslip.values import Vector, call_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

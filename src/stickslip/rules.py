@@ -11,10 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple, Union, cast, get_args, get_origin
 
-from numpy.typing import ArrayLike
-
-Vector = Annotated[ArrayLike, "one number a row"]
-"""Annotation of what may be an array, a list, a data frame's column, ..., of numbers."""
+NUMBERS = "one number a row"
+"""Mark of what may be an array, a list, a data frame's column, ..., of numbers (`stickslip.values.Vector`)."""
 KINDS = {
     "Cascade": "a Cascade (a control law is given by its place, loop=...)",
     "Compensator": "Feedforward(...) or Feedback(...)",
@@ -100,7 +98,7 @@ def rule_of(hint: Any) -> Rule | None:
     """The rule of a type as annotations write it; None where anything fits, or it is not known what does."""
     origin, inner = get_origin(hint), get_args(hint)
     if origin is Annotated:
-        return _several(rule_of(float), iterable=False) if hint == Vector else rule_of(inner[0])
+        return _several(rule_of(float), iterable=False) if NUMBERS in inner[1:] else rule_of(inner[0])
     if origin in (Union, types.UnionType):
         return _union([rule_of(member) for member in inner])
     if hint is None or hint in PLAIN:

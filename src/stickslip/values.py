@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from stickslip.rules import NUMBERS
+
+Vector = Annotated[ArrayLike, NUMBERS]
+"""An array, a list, a data frame's column, ..., of numbers: an annotation that type checkers take for `ArrayLike`."""
 
 
 def call_of(name: str, first: Sequence[object], named: Iterable[tuple[str, object]]) -> str:

@@ -20,11 +20,11 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.record import Record
-from stickslip.rules import Vector
 from stickslip.simulation import case_arrays
 from stickslip.simulation.case_arrays import COLUMNS, UNITS, Case, Outcome, lay_out, slip_rules
 from stickslip.simulation.integrators import insist_on_steps, integrated, reason, without_tolerance
 from stickslip.simulation.metrics import metrics
+from stickslip.values import Vector
 
 SAMPLE = 100.0
 """Bytes that the schedule of one sample takes while it is made"""

@@ -11,11 +11,11 @@ from stickslip.errors import InputError, StepFailure, UnknownName
 from stickslip.jit import compiled_profile, flat
 from stickslip.model import Model, Reference
 from stickslip.record import Record
-from stickslip.rules import Vector
 from stickslip.simulation.case_arrays import Side, ruled, slip_rules
 from stickslip.simulation.prescribed.kernels import Motion, march
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout
+from stickslip.values import Vector
 
 METHODS = ("auto", "step", "rate")
 
