@@ -38,8 +38,9 @@ CARRIED = (
     "others",
 )
 """Of the composition's memory, what a sample hands to the next; the rest are flags and clocks."""
-SMALL = 1e-6
-"""Change of a number by which the matrices are found, in its unit."""
+SIZES = (1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
+"""Changes of a number by which the matrices are found, in its unit, the largest first: a law may be smooth and bend
+within 1e-6 rad a sample. What bends within the smallest one too is a sign for every drive."""
 BENT = 1e-4
 """Part by which answers to changes of other sizes may differ where a law is linear about rest."""
 
@@ -143,20 +144,27 @@ def linearised(
         )
     sticking = with_springs(replace(controller, torque_limit=math.inf), amplitude, frequency)
     run = _Sample(sticking)
-    found = [run.answers(SMALL * row) / SMALL for row in np.eye(run.size + 1)]
-    for row, answer in zip(np.eye(run.size + 1), found):
-        for size in (-SMALL, 10.0 * SMALL):
-            off = np.abs(run.answers(size * row) / size - answer).max()
-            if not off <= BENT * max(float(np.abs(answer).max()), 1.0):
-                raise InputError(
-                    f"controller: {_suspects(controller)} is not smooth about rest, so that there is no linear loop; "
-                    "simulate it instead (`stickslip simulate`, `stickslip rig run track`)"
-                )
+    found = [_slope(run, row, controller) for row in np.eye(run.size + 1)]
     whole = np.array(found).T  # what every number becomes, and the torque, by what changed it
     n = run.size
     # A friction law's spring and the last angle are the same number but for a constant: that one is no motion.
     matrices = moved_and_felt(whole[:n, :n], whole[:n, n:], whole[n:, :n])
     return LinearController((*matrices, float(whole[n, n])), controller.sample_time, delay)
+
+
+def _slope(run: _Sample, row: Array, controller: Controller) -> Array:
+    """What a sample makes of a small change of one number, by that change; `InputError` where the law is bent there."""
+    for size in SIZES:
+        ahead, back, further = (run.answers(h * row) / h for h in (size, -size, 10.0 * size))
+        off = max(float(np.abs(one - ahead).max()) for one in (back, further))
+        if off <= BENT * max(float(np.abs(ahead).max()), 1.0):
+            return 0.5 * (ahead + back)
+    raise InputError(
+        f"controller: {_suspects(controller)} is not smooth about rest (it answers changes of {SIZES[-1]:g} and of "
+        f"{10.0 * SIZES[-1]:g} of {run.name_of(int(row.argmax()))} by other slopes), so that there is no linear loop; "
+        "write a smooth function in place of a sign or a jump, tanh(v / v_s) or a boundary layer, or simulate it "
+        "(`stickslip simulate`, `stickslip rig run track`)"
+    )
 
 
 def moved_and_felt(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array]:
@@ -227,9 +235,9 @@ class _Sample:
         self.n, self.p = controller.settings, controller.parameters
         self.m, self.z = controller.memory(), controller.state()
         self.u = SimpleNamespace(**Surroundings()._asdict())
-        self.run = controller.functions["sample"]
+        self.controller = controller
         for _ in range(3):  # flags of a first sample are set
-            self.run(0.0, 0.0, 0.0, 0.0, self.n, self.m, self.z, self.p, self.u)
+            self._torque(0.0, self.m, self.z, self.u)
         self.rest = self._flat(self.m, self.z)
         self.size = len(self.rest)
         # A constant torque stands at rest, and what observes it moves on: neither is an answer to a change.
@@ -242,8 +250,27 @@ class _Sample:
     def _after(self, change: Array) -> Array:
         m, z, u = _copied(self.m), _copied(self.z), _copied(self.u)
         self._set(m, z, self.rest + change[:-1])
-        torque = self.run(float(change[-1]), 0.0, 0.0, 0.0, self.n, m, z, self.p, u)
+        torque = self._torque(float(change[-1]), m, z, u)
         return np.append(self._flat(m, z), torque)
+
+    def _torque(self, position: float, m: Any, z: Any, u: Any) -> float:
+        """The torque of a sample; `InputError` where the law gives none at rest."""
+        try:
+            torque = self.controller.functions["sample"](position, 0.0, 0.0, 0.0, self.n, m, z, self.p, u)
+            said = "" if m.fault == 0.0 else "gives a torque that is no finite number"
+        except (ArithmeticError, ValueError) as error:
+            torque, said = 0.0, f"ends in {type(error).__name__} ({error})"
+        if said:
+            raise InputError(
+                f"controller: {_suspects(self.controller)} {said} at rest, so that there is no linear loop; let it "
+                "return a torque there too"
+            )
+        return torque
+
+    def name_of(self, place: int) -> str:
+        """What a number that is changed is, for people."""
+        names = [*CARRIED, *_names(self.z)]
+        return "the measured angle" if place == self.size else f"{names[place]!r}, which it remembers"
 
     def _flat(self, m: Any, z: Any) -> Array:
         return np.array([*(getattr(m, name) for name in CARRIED), *_numbers(z)])
@@ -274,6 +301,17 @@ def _numbers(part: Any) -> list[float]:
             out += _numbers(value)
         else:
             out += value if isinstance(value, list) else [value]
+    return out
+
+
+def _names(part: Any, before: str = "") -> list[str]:
+    """The names of the numbers of `_numbers`."""
+    out: list[str] = []
+    for name, value in cast("dict[str, Any]", vars(part)).items():
+        if isinstance(value, SimpleNamespace):
+            out += _names(value, f"{before}{name}.")
+        else:
+            out += [before + name] * (len(cast("list[float]", value)) if isinstance(value, list) else 1)
     return out
 
 
