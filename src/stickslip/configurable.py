@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self, cast
 
 from stickslip.arguments import arguments_checked, no_number
 from stickslip.description import Choice, Field, Option, fields_of, packed
-from stickslip.errors import ParameterError, UnknownName, suggestion
+from stickslip.errors import LawError, ParameterError, UnknownName, suggestion
 from stickslip.origin import Findable
 from stickslip.rules import is_number
 
@@ -150,6 +150,22 @@ class Configurable(Described):
             self.parameters(dict(self.example))
         except ParameterError as error:
             raise ParameterError(f"{error}, in its example") from None
+
+    def insist_on_lists(self) -> None:
+        """Refuse a state with a value per element of which no parameter has a list: it would be of no length.
+
+        Raises
+        ------
+        LawError
+        """
+        counted = {f.par.per for f in self.fields if f.per_element}
+        for f in self.state_fields:
+            if f.per_element and f.par.per not in counted:
+                raise LawError(
+                    f"{self.kind} {self.name!r}: the state {f.name!r} has a value per {f.par.per}, and no parameter "
+                    f"tells how many there are; give Params a field Annotated[tuple[float, ...], Par(...)], with "
+                    f"one value per {f.par.per}, or write {f.name}_1, {f.name}_2, ... of one value each"
+                )
 
     def option_scope(self) -> dict[str, Any]:
         """What the names that choices replace stand for under the chosen options."""

@@ -181,6 +181,7 @@ class ControlLaw(Configurable):
         }
         for name, part in parts.items():
             object.__setattr__(self, name, part)
+        self.insist_on_lists()
         self.try_example()
 
     def holding(self, name: str, law: Law) -> Callable[..., float]:

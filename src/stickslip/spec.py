@@ -218,6 +218,7 @@ class Law(Configurable):
             parts["odd"] = False
         for name, part in parts.items():
             object.__setattr__(self, name, part)
+        self.insist_on_lists()
         self.try_example()
 
     written: Mapping[str, Any] = field(init=False, repr=False)

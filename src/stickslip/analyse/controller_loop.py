@@ -20,6 +20,7 @@ import numpy as np
 from stickslip.analyse.presliding_loop import describing
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
+from stickslip.control.plain import plain_sample
 from stickslip.errors import InputError
 from stickslip.machines.drivetrain import FREE
 from stickslip.model import Model
@@ -255,15 +256,12 @@ class _Sample:
 
     def _torque(self, position: float, m: Any, z: Any, u: Any) -> float:
         """The torque of a sample; `InputError` where the law gives none at rest."""
-        try:
-            torque = self.controller.functions["sample"](position, 0.0, 0.0, 0.0, self.n, m, z, self.p, u)
-            said = "" if m.fault == 0.0 else "gives a torque that is no finite number"
-        except (ArithmeticError, ValueError) as error:
-            torque, said = 0.0, f"ends in {type(error).__name__} ({error})"
-        if said:
+        sample = self.controller.functions["sample"]
+        torque = plain_sample(sample, position, 0.0, 0.0, 0.0, self.n, m, z, self.p, u)
+        if m.fault != 0.0:
             raise InputError(
-                f"controller: {_suspects(self.controller)} {said} at rest, so that there is no linear loop; let it "
-                "return a torque there too"
+                f"controller: {_suspects(self.controller)} gives a torque that is no finite number at rest, so that "
+                "there is no linear loop; let it return a torque there too"
             )
         return torque
 

@@ -37,6 +37,7 @@ from stickslip.contract.verdict import Verdict, failed, held, not_tried
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
+from stickslip.control.read_law import insist_on_subset
 from stickslip.control.registry import control_law
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import LawError
@@ -81,6 +82,7 @@ def subset(law: ControlLaw) -> Verdict:
     """Every function is in the scalar subset and returns on every path."""
     controller = specimen(law)
     try:
+        insist_on_subset(law)
         lower(controller.functions, controller.layouts)
     except LawError as error:
         return failed("subset", str(error))

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from stickslip.arguments import arguments_checked
+from stickslip.control.read_law import read
 from stickslip.control.registry import control_law
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import ParameterError
@@ -51,7 +52,7 @@ class ControlBlock:
         choices: Mapping[str, str] | None = None,
         **parameters: Any,
     ) -> None:
-        found = control_law(law) if isinstance(law, str) else law
+        found = control_law(law) if isinstance(law, str) else read(law)
         self.law: ControlLaw = found.having(**choices) if choices else found
         if self.law.holds_friction and friction is None:
             raise ParameterError(f"{self.law.name}: needs a friction law; give friction=Model(...)")

@@ -12,9 +12,11 @@ from stickslip.arguments import arguments_checked
 from stickslip.control.block import ControlBlock, fields_in, state_fields_in, within
 from stickslip.control.calls import calls_of, deviations_of
 from stickslip.control.composition import MEMORY, Settings, functions_with
+from stickslip.control.plain import plain_sample
 from stickslip.errors import ParameterError, suggestion
 from stickslip.spec import Field, Kept, Learned, Surroundings, fields_of, packed
 from stickslip.subset import Layout
+from stickslip.subset.layout import PARAMETER
 
 FADE = 0.1
 """s, over which a torque that was taken over fades."""
@@ -64,7 +66,7 @@ class Composed:
             "n": Layout.of(fields_of(Settings), counted=False),
             "m": Layout.of(MEMORY, counted=False),
             "z": Layout.of(self.state_fields, counted=False, parts=tuple(parts)),
-            "p": Layout.of(self.fields, counted=True, parts=tuple(parts)),
+            "p": Layout.of(self.fields, counted=True, parts=tuple(parts), fixed=PARAMETER),
             "u": Layout(Surroundings._fields),
         }
 
@@ -86,8 +88,17 @@ class Composed:
             n = self.settings._replace(torque_limit=math.inf, sample_time=self.sample_time or 1.0)
             u = SimpleNamespace(**Surroundings()._asdict())
             torques.append(
-                self.functions["sample"](
-                    0.0, 0.0, 0.0, acceleration, n, self.memory(), self.state(), self.parameters, u
+                plain_sample(
+                    self.functions["sample"],
+                    0.0,
+                    0.0,
+                    0.0,
+                    acceleration,
+                    n,
+                    self.memory(),
+                    self.state(),
+                    self.parameters,
+                    u,
                 )
             )
         return torques[0] != torques[1]

@@ -15,6 +15,7 @@ from stickslip.arguments import arguments_checked
 from stickslip.config import Table
 from stickslip.control.estimators import ESTIMATORS
 from stickslip.control.laws import CONTROL_LAWS
+from stickslip.control.read_law import read
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import ConfigError, LawError, UnknownName
 from stickslip.spec import Law
@@ -44,7 +45,7 @@ def control_law(name: str, named_by: str = "") -> ControlLaw:
             found: ControlLaw = importlib.import_module(f"{folder}.{name}").CONTROL_LAW
             return found.coming_from(control_law, name)
     if name in (others := plugins.installed("stickslip.control_laws")):
-        return others[name].load().coming_from(control_law, name)
+        return read(others[name].load()).coming_from(control_law, name)
     raise UnknownName("control law", name, control_law_names())
 
 
@@ -79,4 +80,4 @@ def _control_law_in(path: str, code: bytes) -> ControlLaw:
     found = getattr(plugins.defined_in(path, code), "CONTROL_LAW", None)
     if not isinstance(found, ControlLaw):
         raise LawError(f"{path} defines no control law; end it with `CONTROL_LAW = ControlLaw(...)`")
-    return found.coming_from(_control_law_in, path, code, path=path)
+    return read(found).coming_from(_control_law_in, path, code, path=path)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.control.plain import plain_sample
 from stickslip.export.nearest import surroundings_of
 from stickslip.model import Model
 from stickslip.spec import Surroundings
@@ -193,7 +194,7 @@ def sampled_torques(
     """What a controller answers to its inputs, N·m, while load and temperature change in ``u``."""
     torque: list[float] = []
     for *row, u.load, u.temperature in zip(*inputs, *change):
-        torque.append(sample(*map(float, row)))
+        torque.append(plain_sample(sample, *map(float, row)))
     return np.array(torque, dtype=np.float64)
 
 

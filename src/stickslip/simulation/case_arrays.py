@@ -34,7 +34,7 @@ UNITS = {
 }  # fmt: skip
 
 # ---- how a kernel ended ------------------------------------------------------------------------------------------
-DONE, DIVERGED, NOT_FINITE, STORM, NO_STEP, ROWS_FULL, TOO_STIFF, TOO_FAST = range(8)
+DONE, DIVERGED, NOT_FINITE, STORM, NO_STEP, ROWS_FULL, TOO_STIFF, TOO_FAST, NO_TORQUE = range(9)
 
 # ---- entries of Case.numbers -------------------------------------------------------------------------------------
 (
@@ -145,6 +145,8 @@ class Outcome:
         steps, rejected, events.
     control : array or None
         The state in which a sampled controller was left.
+    memory : array or None
+        The memory of its composition.
     """
 
     rows: Array
@@ -154,6 +156,7 @@ class Outcome:
     turns: Array
     counts: dict[str, int]
     control: Array | None = None
+    memory: Array | None = None
 
 
 def surroundings(numbers: Array) -> Array:

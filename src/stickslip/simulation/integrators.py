@@ -18,6 +18,7 @@ from stickslip.errors import (
 )
 from stickslip.simulation import case_arrays
 from stickslip.simulation.case_arrays import Case, Outcome
+from stickslip.simulation.no_torque import no_torque
 
 INTEGRATORS = ("exact", "adaptive", "sampled", "fixed")
 """In the order in which `integrator="auto"` tries them."""
@@ -45,6 +46,7 @@ REASONS: dict[int, tuple[type[SimulationError], str]] = {
         "a part of the motion is so fast that its metrics take more than a million nodes of a single step; lower "
         "the controller's gains or bandwidth, or raise the inertia",
     ),
+    case_arrays.NO_TORQUE: (Divergence, ""),
 }
 
 
@@ -136,6 +138,9 @@ def reason(case: Case, name: str, outcome: Outcome) -> tuple[type[SimulationErro
     kind, why = REASONS[outcome.code]
     if outcome.code == case_arrays.TOO_STIFF:
         why += _in_numbers(case, outcome)
+    elif outcome.code == case_arrays.NO_TORQUE:
+        period = float(case.numbers[case_arrays.SAMPLE_TIME])
+        why = no_torque(case.controller, outcome.memory, outcome.time, period)
     if outcome.code not in NO_STEPS or name == "fixed":
         return kind, why
     remedies = [f"a tolerance above {case.numbers[case_arrays.TOLERANCE]:g} rad"]

@@ -90,17 +90,18 @@ def _translate(
     tree, where = parsed(function)
     if name in stack:
         raise LawError(f"{where.at(tree)}: {function.__name__} calls itself; use a `for` loop instead")
-    if found := missing_return(tree, must=not stack and name.strip("_") in MUST):
-        raise LawError(
-            f"{where.at(found)}: {function.__name__}() goes on here without returning a number; end every path with "
-            "`return` and a number"
-        )
+    open_end = missing_return(tree, must=not stack and name.strip("_") in MUST)
     arguments = [a.arg for a in tree.args.args]
     structures = [a for a in arguments if a in layouts and a not in target.numbers]
     views = {a: View(a, "", layouts[a]) for a in structures} | dict(target.views)
     translator = Translator(where, layouts, arguments, views, function.__globals__, flat, names, target)
     translator.rename(tree)
     body = [s for s in (translator.visit(statement) for statement in tree.body) if s is not None]
+    if open_end:  # said last: a `try` in which it returns is no missing return
+        raise LawError(
+            f"{where.at(open_end)}: {function.__name__}() goes on here without returning a number; end every path "
+            "with `return` and a number"
+        )
     if flat:
         # Once at the top: the compiler cannot know that writing to a state leaves the parameters alone.
         body[:0] = [translator.counted(per) for per in translator.counts]

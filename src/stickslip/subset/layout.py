@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 from stickslip.spec import Field, Law, Surroundings
 
+PARAMETER, INPUT, SURROUNDINGS = "a parameter", "an input", "a quantity of the surroundings"
+"""What the fields are that a law may only read."""
+
 
 @dataclass(frozen=True, slots=True)
 class Layout:
@@ -21,9 +24,11 @@ class Layout:
     parts: tuple[str, ...] = ()
     """What the names of fields of each part begin with: ``z.law.force`` is the field ``law_force`` of the part
     ``law_``."""
+    fixed: str = ""
+    """What its fields are to a law, where a law may only read them: "a parameter", "an input"."""
 
     @staticmethod
-    def of(fields: Sequence[Field], *, counted: bool, parts: tuple[str, ...] = ()) -> Layout:
+    def of(fields: Sequence[Field], *, counted: bool, parts: tuple[str, ...] = (), fixed: str = "") -> Layout:
         """Scalars in order, then one block per field that has a value per element."""
         mixed = any(f.per_element and f.par.per != "element" for f in fields)
         return Layout(
@@ -32,6 +37,7 @@ class Layout:
             counted,
             tuple(f.par.per for f in fields if f.per_element) if mixed else (),
             parts,
+            fixed,
         )
 
     def per(self, block: int) -> str:
@@ -48,9 +54,9 @@ def law_layouts(law: Law) -> dict[str, Layout]:
     """The layouts of a law's structured arguments, by argument name."""
     state = Layout.of(law.state_fields, counted=False)
     return {
-        "p": Layout.of(law.fields, counted=True),
+        "p": Layout.of(law.fields, counted=True, fixed=PARAMETER),
         "z": state,
         "dz": state,
         "g": state,
-        "u": Layout(Surroundings._fields),
+        "u": Layout(Surroundings._fields, fixed=SURROUNDINGS),
     }

@@ -12,6 +12,7 @@ from typing import Any
 from stickslip.binding import NEGATIVE, negative
 from stickslip.errors import LawError, suggestion
 from stickslip.subset.layout import Layout
+from stickslip.subset.remedies import REMEDY, instead_of
 from stickslip.subset.source import Place, arguments_of
 
 BUILTINS = {"abs", "min", "max", "range", "len", "float", "int"}
@@ -35,19 +36,6 @@ EXPRESSIONS = (
     ast.Subscript, ast.Call, ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.expr_context,
 )  # fmt: skip
 ALLOWED = (*STATEMENTS, *EXPRESSIONS)
-REMEDY: dict[type[ast.AST], str] = {
-    ast.While: "use `for i in range(n)` with a `break`",
-    ast.ListComp: "use a `for` loop over the elements",
-    ast.GeneratorExp: "use a `for` loop over the elements",
-    ast.Tuple: "assign one name at a time",
-    ast.List: "keep values in the state or in names",
-    ast.Dict: "keep values in the state or in names",
-    ast.Try: "test the value with `if` before using it",
-    ast.Raise: "refuse bad parameters in `check`",
-    ast.Lambda: "write a function at the top of the file",
-    ast.With: "leave it out: a law only computes",
-    ast.JoinedStr: "leave text out: a law only computes",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +158,11 @@ class Translator(ast.NodeTransformer):
     # ---- expressions ---------------------------------------------------------------------------------
 
     def visit_Name(self, node: ast.Name) -> Any:
+        if isinstance(node.ctx, ast.Store) and node.id in self.views:
+            raise LawError(
+                f"{self.where.at(node)}: `{node.id} = ...` hides the argument {node.id!r} and its fields; give the "
+                "number another name"
+            )
         if isinstance(node.ctx, ast.Store) or node.id in self.locals or node.id in self.arguments:
             node.id = self.renamed.get(node.id, node.id)
             return node
@@ -196,6 +189,7 @@ class Translator(ast.NodeTransformer):
                 f"{self.where.at(node)}: {ast.unparse(owner)} has no field {node.attr!r}; "
                 f"{suggestion(node.attr, fields)}"
             )
+        self.insist_on_reading(node, node, view)
         if not self.flat:
             return ast.copy_location(ast.Attribute(ast.Name(view.base, ast.Load()), name, node.ctx), node)
         return self.element(view.base, ast.Constant(view.layout.scalars.index(name)), node)
@@ -209,6 +203,7 @@ class Translator(ast.NodeTransformer):
             raise self.refuse(
                 node, f"{ast.unparse(node.value)}[...]", "it has one value, not one per element"
             )
+        self.insist_on_reading(node, node.value, view)
         if not self.flat:
             value = ast.Attribute(ast.Name(view.base, ast.Load()), name, ast.Load())
             return ast.copy_location(ast.Subscript(value, self.visit(node.slice), node.ctx), node)
@@ -319,10 +314,28 @@ class Translator(ast.NodeTransformer):
         """What the field belongs to, and its whole name."""
         view = self.view(node.value)
         if view is None:
-            raise self.refuse(node, f"`.{node.attr}` here", f"fields belong to {', '.join(self.layouts)}")
+            raise self.refuse(node, *self.no_field(node))
         name, root = view.prefix + node.attr, ast.unparse(node.value).partition(".")[0]
         doubled = name + NEGATIVE in view.layout.scalars + view.layout.blocks
         return view, name + NEGATIVE if self.negative and root == "p" and doubled else name
+
+    def no_field(self, node: ast.Attribute) -> tuple[str, str]:
+        """What is no field of a structure, and what to write in its place."""
+        owner = ast.unparse(node.value)
+        if isinstance(self.scope.get(owner), types.ModuleType):
+            return f"`{owner}.{node.attr}`", instead_of(node.attr, MATH)
+        return f"`.{node.attr}` here", f"fields belong to {', '.join(self.views or self.layouts)}"
+
+    def insist_on_reading(
+        self, node: ast.Attribute | ast.Subscript, field: ast.Attribute, view: View
+    ) -> None:
+        """Refuse to write a field that a law may only read: the change would be in Python's simulation alone."""
+        if not isinstance(node.ctx, ast.Store) or not view.layout.fixed:
+            return
+        raise LawError(
+            f"{self.where.at(node)}: `{ast.unparse(node)} = ...` writes {view.layout.fixed}, which a law only reads; "
+            f"write a local name ({field.attr} = ...), or a field of the state"
+        )
 
     def element(self, name: str, index: ast.expr, like: ast.expr) -> ast.expr:
         return ast.copy_location(
@@ -331,9 +344,13 @@ class Translator(ast.NodeTransformer):
 
     def count(self, node: ast.AST, per: str) -> ast.expr:
         """The number of elements (or what else), which the parameters hold after their scalars."""
-        if self.counting() is None:
+        if (view := self.counting()) is None:
             raise self.refuse(
                 node, "a field per element without `p`", "pass the parameters `p` to this function"
+            )
+        if per not in view.layout.counts:
+            raise self.refuse(
+                node, f"a value per {per}, of which no parameter has a list,", "give Params such a field"
             )
         self.counts[per] = None
         return ast.Name(f"{per}s_", ast.Load())

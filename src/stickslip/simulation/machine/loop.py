@@ -25,9 +25,10 @@ from stickslip.simulation._meter import new_meter, turning_points
 from stickslip.simulation._nodes import SIGNALS
 from stickslip.simulation.case_arrays import ruled, ruled_in, slip_rules
 from stickslip.simulation.compiled_controller import Sampled, compiled
-from stickslip.simulation.machine.drive import COLUMNS, NO_NUMBER, TRIPPED, UNITS, Loop, Output, drive
+from stickslip.simulation.machine.drive import COLUMNS, TRIPPED, UNITS, Loop, Output, drive
 from stickslip.simulation.machine.layout import TOLERANCE, lay_out_machine, stand_at
 from stickslip.simulation.metrics import metrics, settle_band_of
+from stickslip.simulation.no_torque import no_torque
 from stickslip.simulation.train.layout import cannot_locate
 from stickslip.spec import Surroundings
 from stickslip.subset import Layout
@@ -36,7 +37,6 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 REASONS = {
     TRIPPED: "the drive switched off: faster than its encoder follows, or no longer a number",
-    NO_NUMBER: "the controller's torque is no number",
 }
 ON_TIME = 1e-6
 """Samples by which output times may lie beside a sample."""
@@ -101,7 +101,8 @@ def simulate_machine(
     record = Record(columns[0], channels, UNITS, meta)
     if runs[0].code:
         ended = runs[0].ended
-        raise Divergence(f"the run ended at {ended:.6g} s: {REASONS[runs[0].code]}", ended, record)
+        why = REASONS.get(runs[0].code) or no_torque(controller, runs[0].memory, ended, machine.sample_time)
+        raise Divergence(f"the run ended at {ended:.6g} s: {why}", ended, record)
     return record
 
 
@@ -185,6 +186,7 @@ class _Ran:
 
     def __init__(self, loop: Loop, output: Output, code: int):
         self.laid, self.state, self.code = loop.laid, loop.control.state, code
+        self.memory = loop.control.memory
         self.samples, rows = (int(count) for count in output.counts)
         self.rows, self.meter, self.turns = output.rows[:rows], output.acc, output.turns
         self.ended = self.samples * float(loop.laid.machine["sample_time"])

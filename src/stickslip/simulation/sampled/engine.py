@@ -26,6 +26,7 @@ from stickslip.simulation.case_arrays import (
     DURATION,
     ENCODER,
     NO_STEP,
+    NO_TORQUE,
     NOT_FINITE,
     SAMPLE_TIME,
     STORM,
@@ -110,7 +111,7 @@ def run(case: Case) -> Outcome:
     found = {name: int(z[name]) for name in ("steps", "rejected", "events")}
     return Outcome(
         rows, int(code), float(reached["time"]), output.acc, turning_points(output.acc, output.turns), found,
-        control.sampled.state,
+        control.sampled.state, control.sampled.memory,
     )  # fmt: skip
 
 
@@ -153,6 +154,8 @@ def integrate(
     code = DONE
     plant = plant_of(contact)
     act(control, axis, z, contact, plant, 0.0)
+    if not math.isfinite(z.torque):
+        code = NO_TORQUE
     put_out(control, axis, z, 0.0, grid, reached, rows)
     for i in range(stops.shape[0]):
         left = stops[i, 1]
@@ -185,6 +188,8 @@ def integrate(
             break
         if stops[i, 2] > 0.0:
             act(control, axis, z, contact, plant, stops[i, 0])
+            if not math.isfinite(z.torque):
+                code = NO_TORQUE
         put_out(control, axis, z, stops[i, 0], grid, reached, rows)
     if axis.metered:
         close_standstill(output.acc, reached.time)

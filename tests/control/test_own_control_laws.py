@@ -1,0 +1,197 @@
+"""Control laws of one's own that cannot run: one line names the author's file, line and remedy."""
+
+from __future__ import annotations
+
+import pytest
+
+import stickslip as ss
+from stickslip.analyse.controller_loop import linearised
+from stickslip.errors import Divergence, InputError, LawError
+
+HEAD = '''"""A law of one's own."""
+import math
+import numpy as np
+from typing import Annotated, NamedTuple
+from stickslip.control_spec import ControlLaw
+from stickslip.spec import Par
+
+
+class Params(NamedTuple):
+    kp: Annotated[float, Par("N·m/rad", "k_p", "gain", lower=0.0)]
+
+
+class State(NamedTuple):
+    w: Annotated[STATE, Par("N·m", "w", "memory")]
+
+
+'''
+SAMPLE = "def sample(y, z, p, u):\n"
+TAIL = """
+
+CONTROL_LAW = ControlLaw(
+    "own", Params, sample, "loop", title="t", equation="T", source=(), example={"kp": 10.0}, State=State
+)
+"""
+LINE = HEAD.count("\n") + 2
+"""Of the first statement of `sample`."""
+
+
+@pytest.fixture
+def block(tmp_path):
+    """The block of a law with this text of `sample`."""
+
+    def made(body: str, sample: str = SAMPLE, state: str = "float") -> ss.ControlBlock:
+        text = HEAD.replace("STATE", state) + sample + "".join(f"    {line}\n" for line in body.split("\n"))
+        file = tmp_path / "own.py"
+        file.write_text(text + TAIL)
+        return ss.ControlBlock(str(file), kp=10.0)
+
+    return made
+
+
+REFUSED = {
+    "p.kp = 3.0\nreturn p.kp": "`p.kp = ...` writes a parameter, which a law only reads",
+    "p.kp += 3.0\nreturn p.kp": "`p.kp = ...` writes a parameter, which a law only reads",
+    "y.error = 3.0\nreturn p.kp": "`y.error = ...` writes an input, which a law only reads",
+    "u.load = 3.0\nreturn p.kp": "`u.load = ...` writes a quantity of the surroundings",
+    "p = 3.0\nreturn p": "hides the argument 'p'",
+    "z.w = y.error": "goes on here without returning a number",
+    "return float(np.tanh(y.error))": "`np.tanh` is outside the scalar subset; use math.tanh",
+    "return float(np.sign(y.error))": "use math.copysign",
+    "return float(np.fft(y.error))": "of modules only math is read",
+    "try:\n    return y.error\nexcept ValueError:\n    return 0.0": "`Try` is outside the scalar subset",
+    "return y.eror": "y has no field 'eror'; did you mean 'error'",
+}
+
+
+@pytest.mark.parametrize("body", REFUSED)
+def test_it_is_refused_when_the_file_is_read_with_its_own_line(body, block):
+    """The first three ran in Python and ended in an export; others named a text that nobody has written."""
+    with pytest.raises(LawError) as found:
+        block(body)
+    said = str(found.value)
+    assert REFUSED[body] in said
+    assert f"own.py, line {LINE}:" in said
+    assert "\n" not in said
+
+
+def test_a_helper_is_held_to_the_same(block):
+    with pytest.raises(LawError, match=r"own.py, line .*`par.kp = ...` writes a parameter"):
+        block(
+            "return help_out(y, p)",
+            "def help_out(seen, par):\n    par.kp = seen.error\n    return 0.0\n\n" + SAMPLE,
+        )
+
+
+def test_what_is_no_function_of_its_arguments_is_refused(block):
+    method = (
+        "class H:\n    def sample(self, y, z, p, u):\n        return p.kp\nsample = H().sample\ndef no():\n"
+    )
+    with pytest.raises(
+        LawError, match=r"own.py, line .*sample is a method; write it as `def sample\(y, z, p, u"
+    ):
+        block("return 0.0", method)
+    with pytest.raises(LawError, match=r"own.py, line .*takes \(y, z\); write it as"):
+        block("return 0.0", "def sample(y, z):\n")
+
+
+def test_a_state_of_no_length_is_refused(block):
+    """It ended in a ValueError, and its elements were written beside the state."""
+    with pytest.raises(LawError, match="state 'w' has a value per element, and no parameter tells how many"):
+        block("z.w[0] = y.error\nreturn p.kp", state="tuple[float, ...]")
+
+
+def test_arguments_may_have_other_names(block):
+    assert (
+        block("seen = s.error\nreturn par.kp * seen", "def sample(s, own, par, around):\n").law.name == "own"
+    )
+
+
+def test_a_friction_law_that_writes_its_parameters_is_refused(tmp_path):
+    text = """from typing import Annotated, NamedTuple
+from stickslip.spec import Law, Par
+
+
+class Params(NamedTuple):
+    fc: Annotated[float, Par("N·m", "F_C", "level", positive=True)]
+
+
+def step(v0, v1, dt, z, p, u):
+    p.fc = 2.0
+    return p.fc * v1
+
+
+LAW = Law("writes", Params, step, title="t", equation="F", source=(), example={"fc": 1.0})
+"""
+    file = tmp_path / "writes.py"
+    file.write_text(text)
+    with pytest.raises(LawError, match=r"writes.py, line 10: `p.fc = ...` writes a parameter"):
+        ss.Model(str(file), fc=1.0)
+
+
+# ---- a torque that is no number ------------------------------------------------------------------------------------
+
+AXIS = ss.RigidAxis(1e-3, ss.Model("coulomb", fc=0.1))
+SINE = ss.Reference("sine", amplitude=0.1, frequency=1.0)
+
+
+def controller(loop: ss.ControlBlock, **more) -> ss.Controller:
+    return ss.Controller(loop=loop, sample_time=1e-3, torque_limit=2.0, **more)
+
+
+@pytest.mark.parametrize("axis", ["axis", "machine"])
+def test_a_controller_that_gives_no_number_is_named_with_what_it_was_handed(axis, block):
+    """It was "no step that meets the tolerance was found"."""
+    plant = AXIS if axis == "axis" else ss.load_machine("thesis-dry")
+    late = "if y.reference > 0.001:\n    return p.kp * math.sqrt(-y.reference)\nreturn p.kp * y.error"
+    with pytest.raises(Divergence) as found:
+        ss.simulate(plant, controller(block(late)), SINE, 0.2)
+    said = str(found.value)
+    assert "the loop 'own' gave no finite number in sample" in said
+    assert "(of 0.001 s each)" in said
+    assert "reference = 0.00" in said
+    assert found.value.time > 0.01
+    assert found.value.record.time[-1] >= found.value.time - 2e-3
+
+
+def test_the_place_is_told_where_it_can_be(block):
+    ahead = ss.ControlBlock("inertia_feedforward", inertia=1e-3)
+    with pytest.raises(Divergence, match="the loop 'own' gave no"):
+        ss.simulate(AXIS, controller(block("return y.error / y.velocity"), feedforward=ahead), SINE, 0.2)
+
+
+def test_an_export_says_where_plain_python_ends(tmp_path, block):
+    """It was a traceback."""
+    bad = controller(block("return math.sqrt(y.error)"))
+    with pytest.raises(LawError, match=rf"own.py, line {LINE}: ValueError .*test the value with `if`"):
+        ss.export(bad, to="c99", folder=tmp_path / "c")
+
+
+# ---- the linear loop about rest ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("width", [1.0, 0.1, 1e-2, 1e-4])
+def test_a_smooth_law_is_linear_about_rest_however_soon_it_bends(width, block):
+    """Laws that bend within 0.02 rad/s were refused: 1e-5 rad are 0.01 rad/s in a sample."""
+    bent = controller(block(f"return -{width} * math.tanh(y.velocity / {width})"))
+    straight = controller(block("return -1.0 * y.velocity"))
+    found, wanted = (linearised(c, 1e-6, 100.0).state_space() for c in (bent, straight))
+    assert found[3] == pytest.approx(wanted[3], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "body",
+    ["return -math.copysign(0.1, y.velocity)", "return -abs(y.velocity)", "return math.sqrt(abs(y.error))"],
+)
+def test_a_bend_at_rest_is_refused_with_its_remedy(body, block):
+    with pytest.raises(
+        InputError, match=r"own is not smooth about rest .*write a smooth function in place of a sign"
+    ):
+        linearised(controller(block(body)), 1e-6, 100.0)
+
+
+def test_no_torque_at_rest_is_no_linear_loop(block):
+    with pytest.raises(LawError, match=r"own.py, line .*ZeroDivisionError"):
+        linearised(controller(block("return y.error / y.velocity")), 1e-6, 100.0)
+    with pytest.raises(InputError, match="gives a torque that is no finite number at rest"):
+        linearised(controller(block("return y.error * math.inf")), 1e-6, 100.0)
