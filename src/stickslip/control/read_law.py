@@ -5,7 +5,6 @@ Later, in a controller, a law is a part of a longer text.
 
 from __future__ import annotations
 
-import functools
 import types
 from collections.abc import Callable
 from typing import Any
@@ -28,7 +27,10 @@ OURS = "stickslip.control."
 """Where the laws of the package are: they are read in its tests."""
 
 
-@functools.lru_cache(maxsize=1024)
+_read: set[Any] = set()
+"""The texts that were read."""
+
+
 def read(law: ControlLaw) -> ControlLaw:
     """The law, where its functions are in the scalar subset.
 
@@ -37,8 +39,14 @@ def read(law: ControlLaw) -> ControlLaw:
     LawError
         With the file and line of the author, and what to write instead.
     """
-    if not str(getattr(law.written["sample"], "__module__", "")).startswith(OURS):
+    if str(getattr(law.written["sample"], "__module__", "")).startswith(OURS):
+        return law
+    # By their texts: with other sines in the place of `math`'s, as its contract tries it, a law is the same.
+    texts = [getattr(f, "__code__", f) for f in (*(getattr(law, n) for n in TAKES), *law.deviations.values())]
+    key = (*texts, *((f.name, f.per_element) for f in (*law.fields, *law.state_fields)))
+    if key not in _read:
         insist_on_subset(law)
+        _read.add(key)
     return law
 
 
