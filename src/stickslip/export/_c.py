@@ -25,6 +25,11 @@ KEYWORDS = {
     "assert", "signgam", "linux", "unix",
 }  # fmt: skip
 """Words of C and C++, and names of the library, which a local name would hide."""
+HEADERS = frozenset({
+    "assert", "complex", "ctype", "errno", "fenv", "float", "inttypes", "iso646", "limits", "locale", "math", "setjmp",
+    "signal", "stdarg", "stdbool", "stddef", "stdint", "stdio", "stdlib", "string", "tgmath", "time", "wchar", "wctype",
+})  # fmt: skip
+"""Headers of the library: a file of that name beside the others stands in their place."""
 MATH = {"fabs", "exp", "expm1", "log", "log1p", "sqrt", "sin", "cos", "tan", "atan", "atan2", "tanh", "sinh", "cosh",
         "floor", "ceil", "copysign", "pow", "hypot"}  # fmt: skip
 

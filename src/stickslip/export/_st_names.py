@@ -52,6 +52,13 @@ def named_in_st(names: Iterable[str], taken: Iterable[str] = RESERVED) -> Mappin
     return found
 
 
+def renamed(name: str, taken: str) -> tuple[str, ...]:
+    """What the user must know of a block that is called otherwise, a sentence each."""
+    if name == taken:
+        return ()
+    return (f"{name} is no name in structured text, or is taken there: the block is called {taken}",)
+
+
 def plain(name: str) -> str:
     """The name without what the norm forbids."""
     letters = re.sub(r"_+", "_", name).strip("_")

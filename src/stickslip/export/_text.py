@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import jinja2
 
+    from stickslip.control_spec import ControlLaw
+    from stickslip.spec import Law
+
 LETTERS = {
     "·": "*", "²": "^2", "³": "^3", "°": "deg", "µ": "u", "μ": "u", "−": "-", "–": "-", "×": "x", "≤": "<=",
     "≥": ">=",
@@ -41,6 +44,16 @@ def ascii_only(text: str) -> str:
     for letter, plain in LETTERS.items():
         text = text.replace(letter, plain)
     return text.encode("ascii", "replace").decode().replace("*/", "* /")
+
+
+def summary(name: str, text: str) -> str:
+    """The summary of a function's docstring; its name where it has none, as a comment is never empty."""
+    return ascii_only(first_line(text)) or f"{name.strip('_')}()"
+
+
+def sources(law: Law | ControlLaw) -> str:
+    """Where a law comes from, for people."""
+    return "; ".join(law.source) or "none stated"
 
 
 def first_line(text: str) -> str:

@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from stickslip.export import c99
+from stickslip.export._c import HEADERS
 from stickslip.export._text import ascii_only, render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target
@@ -99,4 +100,5 @@ TARGET = Target(
     check,
     around="position, load, temperature and time are yours to set in `u`",
     tried="g++, avr-g++ (ATmega328P) and arm-none-eabi-g++; not on a board",
+    reserved=HEADERS,
 )

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.export._analysis import Facts, analyse, merged
-from stickslip.export._c import Dialect, functions, head, safe
+from stickslip.export._c import HEADERS, Dialect, functions, head, safe
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export._text import ascii_only, render, sources, summary
 from stickslip.export.golden import (
     PACE,
     Golden,
@@ -77,14 +77,14 @@ def write(job: Job) -> Export:
     known = analyse(trees)
     public = [n for n in ("_step", "_steady", "_holding") if n in trees]
     written = functions(trees, known, dialect, public)
-    about = {name: ascii_only(first_line(doc)) for name, doc, _ in written}
+    about = {name: summary(name, doc) for name, doc, _ in written}
     vectors = golden_around(job.model, PACE)
     room = jumps_of(job, vectors)
     common: dict[str, Any] = {
         "substeps_head": substeps_head(dialect, known["_step"]), "step_arguments": known["_step"].arguments,
         "x": job.name, "X": job.name.upper(), "title": ascii_only(law.title), "real": dialect.real,
         "counts": {dialect.count(n): size for n, size in counts_in(job.model).items()},
-        "source": ascii_only("; ".join(law.source)),
+        "source": ascii_only(sources(law)),
         "equation": textwrap.wrap(ascii_only(law.equation), 110, break_long_words=False),
         "surroundings": ", ".join(dialect.number(x) for x in Surroundings()),
         "moved": isinstance(vectors, Surrounded), "columns": len(vectors),
@@ -280,4 +280,5 @@ TARGET = Target(
     precision=True,
     around="position, load, temperature and time are yours to set in `u`",
     tried="gcc, clang: every bit",
+    reserved=HEADERS,
 )

@@ -17,7 +17,7 @@ from stickslip.control.controller import Controller
 from stickslip.export._analysis import Facts, analyse
 from stickslip.export._c import Dialect, functions, head
 from stickslip.export._step_error import PARTS, about_steps
-from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export._text import render, summary
 from stickslip.export.c99 import (
     SINGLE_BOUND,
     STRUCTURES,
@@ -105,7 +105,7 @@ def code_of(controller: Controller, dialect: Dialect) -> dict[str, Any]:
     trees = trees_of(controller, [*(n for n in PUBLIC if n.endswith("_turns") or not dialect.single), *told])
     known, public = analyse(trees), [n for n in (*PUBLIC, *told) if n in trees]
     written = functions(trees, known, dialect, public)
-    about = {n: ascii_only(first_line(doc)) for n, doc, _ in written}
+    about = {n: summary(n, doc) for n, doc, _ in written}
     text = "\n".join(line for _, _, lines in written for line in lines)
     x = dialect.prefix
     return {

@@ -137,7 +137,11 @@ def _gives(part: str, block: ControlBlock) -> str:
 def laws_of(controller: Controller) -> list[str]:
     """Its laws, a line each."""
     return [
-        ascii_only(f"{part}: {block.law.title}; {', '.join(block.law.source)}")
+        ascii_only(
+            "; ".join(
+                [f"{part}: {block.law.title}", *([", ".join(block.law.source)] if block.law.source else [])]
+            )
+        )
         for part, block in controller.blocks.items()
     ]
 

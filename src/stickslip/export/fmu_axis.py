@@ -20,7 +20,7 @@ from stickslip.export._c import Dialect, functions
 from stickslip.export._fmu import Variable, contents_of, law_variables, numbered, surroundings_read, units_of
 from stickslip.export._fmu_run import checked
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export._text import render, summary
 from stickslip.export.golden import csv_of
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Setting, Target, settings_of
@@ -143,7 +143,7 @@ def step_code(name: str) -> Mapping[str, Any]:
     return {
         "rounding": step.ROUNDING,
         "least": step.LEAST,
-        "functions": [{"about": ascii_only(first_line(doc)), "lines": lines} for _, doc, lines in written],
+        "functions": [{"about": summary(name, doc), "lines": lines} for name, doc, lines in written],
         "structures": [
             {"name": STRUCTURES[a], "about": about, "fields": fields_used(trees, a, step.LAYOUTS[a].scalars)}
             for a, about in ABOUT.items()

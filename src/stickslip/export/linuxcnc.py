@@ -14,11 +14,17 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from stickslip.export import c99
+from stickslip.export._c import KEYWORDS
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import ascii_only, render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target
 
+WORDS = frozenset({
+    "author", "component", "description", "examples", "function", "include", "license", "modparam", "notes", "option",
+    "param", "pin", "see_also", "type", "variable",
+})  # fmt: skip
+"""Of halcompile, besides those of C."""
 NOTE = "run in our tests against the golden vectors; not tried on a machine"
 
 
@@ -72,4 +78,5 @@ TARGET = Target(
     check,
     around="position, load and temperature are pins, time runs by itself, no torque is applied from outside",
     tried="halcompile of LinuxCNC 2.9, gcc; not on a machine",
+    reserved=frozenset(KEYWORDS) | WORDS,
 )

@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 from stickslip.export._matlab import functions, local, safe, with_helpers
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export._text import ascii_only, render, summary
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
@@ -56,15 +56,15 @@ def write(job: Job) -> Export:
 
 def _file(job: Job, entry: str, parts: list[tuple[str, str, list[str]]]) -> str:
     """One public function with the local ones that it calls."""
-    *inner, (_, about, lines) = parts
+    *inner, (own_name, about, lines) = parts
     own, public = local(entry) + "(", f"{job.name}_{entry}("
     head = lines[0].replace(own, public, 1)
     if entry == "step":  # of every law alike, also of one without memory
         head = head.replace("[torque_]", "[torque_, z]")
-    lines = [head, f"    % {first_line(about)}", f"    % {job.model.law.title}. SI units.", *lines[1:]]
+    lines = [head, f"    % {summary(own_name, about)}", f"    % {job.model.law.title}. SI units.", *lines[1:]]
     text = [*lines, ""]
-    for _, doc, code in inner:
-        text += [code[0], f"    % {first_line(doc)}", *code[1:], ""]
+    for name, doc, code in inner:
+        text += [code[0], f"    % {summary(name, doc)}", *code[1:], ""]
     return "\n".join(with_helpers(text))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.controller import Controller
 from stickslip.export._matlab import functions, local, safe, with_helpers
-from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export._text import ascii_only, first_line, render, summary
 from stickslip.export.controllers import (
     STILL,
     ControllerTarget,
@@ -66,8 +66,8 @@ def entry_of(controller: Controller, entry: str) -> list[str]:
         *lines[1:],
         "",
     ]
-    for _, doc, code in inner:
-        out += [code[0], f"    % {first_line(doc)}", *code[1:], ""]
+    for name, doc, code in inner:
+        out += [code[0], f"    % {summary(name, doc)}", *code[1:], ""]
     return with_helpers(out)
 
 

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.export._analysis import merged
-from stickslip.export._modelica import functions, safe
+from stickslip.export._modelica import KEYWORDS, functions, safe
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import ascii_only, render
+from stickslip.export._text import ascii_only, render, sources
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
@@ -52,7 +52,7 @@ def write(job: Job) -> Export:
         "x": job.name,
         "title": ascii_only(law.title).replace('"', "'").replace("\\", "/"),
         "equation": textwrap.wrap(ascii_only(law.equation), 100, break_long_words=False),
-        "source": ascii_only("; ".join(law.source)),
+        "source": ascii_only(sources(law)),
         "parameters": [*declared(law.fields, p, law.elements_in(p))],
         "states": [*declared(law.state_fields, None, law.elements_in(p))] or none_taken(heads),
         "around": [f"Real {safe(n)}(start = {v!r}, fixed = true);" for n, v in Surroundings()._asdict().items()],
@@ -186,4 +186,5 @@ TARGET = Target(
     around="position, load and temperature are inputs and time the simulation's in Contact; in Axis they stand still, "
     "as its parameter u",
     tried="pymoca, an evaluator; in rumoca Axis, and Contact of laws without state",
+    reserved=frozenset({*KEYWORDS, "Modelica"}),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import keyword
 import math
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import render
+from stickslip.export._text import render, sources
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
@@ -33,7 +34,7 @@ def write(job: Job) -> Export:
         "python.py.j2",
         x=job.name,
         law=law,
-        source="; ".join(law.source),
+        source=sources(law),
         counts={constant(n): size for n, size in counts_in(job.model).items()},
         parameters=[*assigned(law.fields, p._asdict())],
         states=[*cleared(law.state_fields)],
@@ -116,4 +117,5 @@ TARGET = Target(
     check,
     around="position, load and temperature are arguments of `step`, time runs by itself",
     tried="Python: every bit",
+    reserved=frozenset(keyword.kwlist) | sys.stdlib_module_names,
 )

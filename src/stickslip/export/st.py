@@ -8,9 +8,9 @@ from typing import Any
 
 from stickslip.export._hoist import hoisted
 from stickslip.export._st import Names, functions, number
-from stickslip.export._st_names import RESERVED, named_in_st
+from stickslip.export._st_names import RESERVED, named_in_st, renamed
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import ascii_only, first_line, render
+from stickslip.export._text import ascii_only, render, sources, summary
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Export, Job, counts_in
 from stickslip.export.target import Target
@@ -39,6 +39,8 @@ BLOCK = (
 )
 """Variables of the function block, which has another name."""
 SUBSTEPS = "The block's input `substeps` divides the step of a cycle, the velocity linear in between."
+EXACT = ("expm1", "log1p")
+"""Functions that the norm lacks, and that come along."""
 STRUCTURES = {"z": "state", "p": "parameters", "u": "surroundings"}
 NOTE = "taken by the compiler iec2c (matiec), run in our tests; not tried on a vendor's hardware"
 
@@ -59,7 +61,7 @@ def write(job: Job) -> Export:
         "file": f"{job.name}.st",
         "title": ascii_only(law.title),
         "equation": textwrap.wrap(ascii_only(law.equation), 110, break_long_words=False),
-        "source": ascii_only("; ".join(law.source)),
+        "source": ascii_only(sources(law)),
         "parameters": [*declared(law.fields, p._asdict(), counts, word)],
         "states": [*declared(law.state_fields, {}, counts, word)],
         "around": around,
@@ -74,13 +76,16 @@ def write(job: Job) -> Export:
         "golden.csv": as_csv(golden_around(job.model, PACE)),
         "README.md": render("st_readme.md.j2", **values, **about_steps(job.model, SUBSTEPS)),
     }
-    return Export(files, (NOTE,))
+    return Export(files, (*renamed(job.name, x), NOTE))
 
 
 def about(parts: Iterable[tuple[str, str, list[str]]]) -> list[dict[str, Any]]:
     """The functions as the template takes them."""
     return [
-        {"about": ascii_only(first_line(doc)) or f"{of.strip('_')}, to full precision near 0", "lines": lines}
+        {
+            "about": f"{summary(of, doc)}{', to full precision near 0' if of.strip('_') in EXACT else ''}",
+            "lines": lines,
+        }
         for of, doc, lines in parts
     ]
 

@@ -9,7 +9,7 @@ from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.controller import Controller
 from stickslip.export._hoist import hoisted
 from stickslip.export._st import Names, functions, number
-from stickslip.export._st_names import RESERVED, named_in_st
+from stickslip.export._st_names import RESERVED, named_in_st, renamed
 from stickslip.export._text import render
 from stickslip.export.controllers import (
     STILL,
@@ -83,7 +83,7 @@ def write(controller: Controller, name: str, single: bool = False, around: Surro
         "golden_samples.csv": as_csv(golden_samples(controller, around)),
         "README.md": render("st_controller_readme.md.j2", **values),
     }
-    return Export(files, (NOTE,))
+    return Export(files, (*renamed(name, x), NOTE))
 
 
 def call(function: str, arguments: Sequence[str], word: Mapping[str, str]) -> str:

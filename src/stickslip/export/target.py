@@ -76,6 +76,8 @@ class Target:
         Where a law that depends on its surroundings finds them; what stands still is named.
     tried : str
         In what its output was tried.
+    reserved : frozenset of str
+        Words that no export may have as its name: those of the language, and files that its own would hide.
     """
 
     name: str
@@ -87,6 +89,20 @@ class Target:
     settings: tuple[Setting, ...] = ()
     around: str = ""
     tried: str = ""
+    reserved: frozenset[str] = frozenset()
+
+    def insist_on_name(self, name: str) -> None:
+        """Refuse a name that stands for something else in the target's language.
+
+        Raises
+        ------
+        InputError
+        """
+        if name in self.reserved:
+            raise InputError(
+                f"--name {name}: the word, or a file of that name, is taken in {self.name}; give another name, such as "
+                f"{name}_friction"
+            )
 
     @property
     def carries(self) -> str:

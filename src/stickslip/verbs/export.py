@@ -201,6 +201,7 @@ def export(
     refuse_controllers(chosen, controller, compensator)
     content = content_of(source)
     own = name or re.sub(r"[^A-Za-z0-9_]+", "_", Path(content.document.name).stem)
+    chosen.insist_on_name(own)
     if compensator is None and options.given:
         option = options.given[0].replace("_", "-")
         raise InputError(f"--{option} belongs to --compensator; give both or neither")
