@@ -7,8 +7,10 @@ from collections.abc import Callable
 from typing import TextIO
 
 SOON = 1.0
-"""s of compiling before a word is said of it: a law of one's own takes less."""
+"""s of compiling before a word is said of it."""
 WORDS = "compiling for this machine, some 20 s, once after an installation; `stickslip warm-up` does it beforehand"
+OWN_WORDS = "compiling this controller or law for this machine, once: the result is kept"
+"""Of what warm-up does not know: a file of one's own, laws that nobody has put together before."""
 _listeners: list[Notice] = []
 
 
@@ -28,13 +30,16 @@ class Notice:
         self.stream, self.clock = stream, clock
         self.depth = self.count = 0
         self.said = False
+        self.words = WORDS
         self.timer: threading.Timer | None = None
         self.lock = threading.RLock()
 
-    def started(self) -> None:
-        """A function begins to be compiled, perhaps for another one."""
+    def started(self, words: str = WORDS) -> None:
+        """A function begins to be compiled, perhaps for another one; ``words`` are said of it if it takes long."""
         with self.lock:
             self.depth += 1
+            if self.depth == 1:
+                self.words = words
             if self.depth == 1 and not self.said:
                 self.timer = self.clock(SOON, self.say)
                 self.timer.daemon = True
@@ -56,7 +61,7 @@ class Notice:
         with self.lock:
             if not self.said:
                 self.said = True
-                print(f"stickslip: {WORDS}", file=self.stream, flush=True)
+                print(f"stickslip: {self.words}", file=self.stream, flush=True)
 
     def close(self) -> None:
         """End the line of the count."""
@@ -75,10 +80,10 @@ def silence() -> None:
     _listeners.clear()
 
 
-def started() -> None:
-    """Tell everyone that a function begins to be compiled."""
+def started(words: str = WORDS) -> None:
+    """Tell everyone that a function begins to be compiled, and what is to be said of it."""
     for notice in _listeners:
-        notice.started()
+        notice.started(words)
 
 
 def ended() -> None:

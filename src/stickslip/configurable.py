@@ -215,7 +215,8 @@ class Configurable(Described):
         known = {choice.name: choice for choice in self.choices}
         for name, option in names.items():
             if name not in known:
-                raise UnknownName(f"choice of {self.kind} {self.name!r}", name, known)
+                all_of = f"Its choices are {', '.join(known)}." if known else ""
+                raise UnknownName(f"choice of {self.kind} {self.name!r}:", name, known, further=all_of)
             if option not in known[name].options:
                 raise UnknownName(name.replace("_", " "), option, known[name].options)
         wanted = {**self.chosen, **names}.items()

@@ -76,12 +76,17 @@ class ParameterError(InputError):
 
 
 class UnknownName(InputError):
-    """A name that is not registered in its family; `meant`, if it is one of the known, is what it stands for."""
+    """A name that is not registered in its family; `meant`, if it is one of the known, is what it stands for.
 
-    def __init__(self, family: str, name: object, known: Iterable[str], meant: str = "") -> None:
+    ``further`` is said besides: what else there is.
+    """
+
+    def __init__(
+        self, family: str, name: object, known: Iterable[str], meant: str = "", further: str = ""
+    ) -> None:
         names = sorted(known)
         remedy = f"did you mean {meant!r}?" if meant in names else suggestion(str(name), names)
-        super().__init__(f"unknown {family} {name!r}; {remedy}")
+        super().__init__(f"unknown {family} {name!r}; {remedy}{f' {further}' if further else ''}")
 
 
 class ModelRemark(UserWarning):

@@ -14,7 +14,7 @@ import importlib
 import importlib.util
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
@@ -22,7 +22,7 @@ from typing import Any
 
 from stickslip import approval, trial
 from stickslip.arguments import arguments_checked
-from stickslip.errors import InputError, LawError, UnknownName
+from stickslip.errors import InputError, LawError, UnknownName, suggestion
 from stickslip.origin import TEXT
 from stickslip.spec import COMPILED, Law, ReferenceKind
 from stickslip.subset import law_layouts, lower
@@ -57,7 +57,18 @@ def law(name: str, named_by: str = "") -> Law:
         return files[name]
     if name in (others := installed("stickslip.laws")):
         return _tried(others[name].load(), f"installed law {name!r}").coming_from(law, name)
-    raise UnknownName("law", name, law_names())
+    raise unknown_law("law", name, law_names())
+
+
+def unknown_law(family: str, name: str, known: Sequence[str]) -> UnknownName:
+    """The error of a law's name that nobody knows; the name of a file of one's own has its ending."""
+    file = f"{name}.py"
+    if Path(file).is_file():
+        return UnknownName(family, name, (*known, file), file)
+    if suggestion(name, known).startswith("did you mean"):
+        return UnknownName(family, name, known)
+    hint = f"(The name of a file of your own has its ending, {file!r}, and the folder where it lies.)"
+    return UnknownName(family, name, known, further=hint)
 
 
 @functools.cache

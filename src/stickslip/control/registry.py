@@ -17,7 +17,7 @@ from stickslip.control.estimators import ESTIMATORS
 from stickslip.control.laws import CONTROL_LAWS
 from stickslip.control.read_law import read
 from stickslip.control_spec import ControlLaw
-from stickslip.errors import ConfigError, LawError, UnknownName
+from stickslip.errors import ConfigError, LawError
 from stickslip.spec import Law
 
 BUILT_IN = {"stickslip.control.laws": CONTROL_LAWS, "stickslip.control.estimators": ESTIMATORS}
@@ -46,7 +46,7 @@ def control_law(name: str, named_by: str = "") -> ControlLaw:
             return found.coming_from(control_law, name)
     if name in (others := plugins.installed("stickslip.control_laws")):
         return read(others[name].load()).coming_from(control_law, name)
-    raise UnknownName("control law", name, control_law_names())
+    raise plugins.unknown_law("control law", name, control_law_names())
 
 
 def law_or_control_law(path: str, named_by: str = "") -> Law | ControlLaw:
