@@ -92,7 +92,9 @@ def friction_steady(v: float, p: Any) -> float:
 @constructor_named
 @dataclass(frozen=True, eq=False, repr=False)
 class ControlLaw(Configurable):
-    """A control law (see the module's docstring for its functions and their arguments).
+    """A control law (``help("stickslip.control_spec")`` has its functions and their arguments).
+
+    ``stickslip law --template control`` prints a complete file of one, ``help(stickslip.ControlBlock)`` a short one.
 
     Attributes
     ----------

@@ -121,7 +121,25 @@ class ReferenceKind(Described):
 @constructor_named
 @dataclass(frozen=True, eq=False, repr=False)
 class Law(Configurable):
-    """A friction law (see the module's docstring for its functions and their arguments).
+    """A friction law (``help("stickslip.spec")`` has its functions and their arguments).
+
+    ``stickslip law --template friction`` prints a complete file of one; ``Model("my_law.py", fc=0.3)`` takes it, and
+    ``stickslip law my_law.py --check`` tries it. In short::
+
+        from typing import Annotated, NamedTuple
+        from stickslip import Law, Par
+
+        class Params(NamedTuple):
+            c: Annotated[float, Par("N·m·s/rad", "c", "viscous friction coefficient", positive=True)]
+
+        def step(v0, v1, dt, z, p, u):
+            return p.c * v1
+
+        LAW = Law(
+            "my_law", Params, step, title="Viscous friction", equation="F = c v", source=(), example={"c": 0.02}
+        )
+
+    More is in docs/howto/own_law.md and CONTRIBUTING.md in the source of the package.
 
     Attributes
     ----------

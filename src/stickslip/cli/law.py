@@ -1,10 +1,15 @@
-"""Explain a friction law: its equation, its parameters with units and bounds, its choices, its source.
+"""Explain a friction or control law: its equation, its parameters with units and bounds, its choices, its source.
 
     stickslip law gms
     stickslip law lugre --plot                        draws law-lugre.png
     stickslip law gms --plot gms.svg --set slip_rule=literal --set k=[1e4,5e3] --set alpha=[0.5,0.5]
     stickslip law my_law.py --plot
-    stickslip law my_law.py --check                   tests a law of your own
+    stickslip law my_law.py --check                   tests a law of your own, for friction or control
+    stickslip law --template friction > my_law.py     a complete small law to begin from
+    stickslip law --template control > my_loop.py     the same for a control law
+
+Where it is documented: help("stickslip.spec") and help("stickslip.control_spec") in Python; docs/howto/own_law.md and
+docs/howto/own_control_law.md in the source of the package.
 
 The picture shows the torque along a slow sine, in pre-sliding, and after steps in velocity.
 """
@@ -21,16 +26,25 @@ from stickslip.cli import _files
 from stickslip.errors import InputError
 
 if TYPE_CHECKING:
+    from stickslip.control_spec import ControlLaw
     from stickslip.model import Model
-    from stickslip.spec import Field, Law
+    from stickslip.spec import Choice, Configurable, Field, Law
 
-SUMMARY = "explain a friction law: equation, parameters, source, plot"
+SUMMARY = "explain or check a friction or control law; print one to begin from"
+TEMPLATES = ("friction", "control")
+"""Laws to begin from, in the folder ``starters``."""
 DEFAULT = Path()
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """The name, the picture, parameters."""
-    parser.add_argument("name", help="law listed by `stickslip laws`, or path of a law file")
+    parser.add_argument(
+        "name", nargs="?", default="",
+        help="law listed by `stickslip laws`, control law, or path of the file of either",
+    )  # fmt: skip
+    parser.add_argument(
+        "--template", choices=TEMPLATES, help="print a complete small law to begin from, and exit"
+    )
     parser.add_argument(
         "--plot", type=Path, nargs="?", const=DEFAULT, metavar="FILE",
         help="draw the law into FILE.png, .svg or .pdf (default: law-NAME.png)",
@@ -43,21 +57,47 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--check", action="store_true",
         help="try what engines, identification and exports rely on: subset, units, dissipation, step against rate, "
-        "modes, derivatives, single precision, every export (a minute)",
+        "modes, derivatives, single precision, every export (a minute); of a control law limit, "
+        "faults, take-over and rest besides",
     )  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the description of the law; draw it; or check it."""
-    from stickslip import plugins
-
-    law = plugins.law(args.name)
+    """Print the description of the law; draw it; check it; or print one to begin from."""
+    if args.template:
+        print(template(args.template), end="")
+        return 0
+    if not args.name:
+        raise InputError("name a law (`stickslip laws` lists them), or a file; or give --template friction")
+    law = named(args.name)
     if args.check:
         if args.plot is not None or args.set:
             raise InputError(
                 "--check tests the law as written in its file; use --plot and --set in a separate call"
             )
         return check(law)
+    if law.kind == "control law":
+        return describe_control(law, args)
+    return describe(law, args)
+
+
+def template(kind: str) -> str:
+    """The text of a law to begin from."""
+    return (Path(__file__).parent / "starters" / f"{kind}_law.py").read_text(encoding="utf-8")
+
+
+def named(name: str) -> Any:
+    """The friction or control law of that name or file; the error is that of a friction law where it is neither."""
+    from stickslip import plugins
+    from stickslip.control.registry import control_law, control_law_names, law_or_control_law
+
+    if name.endswith(".py"):
+        return law_or_control_law(name)
+    return control_law(name) if name in control_law_names() else plugins.law(name)
+
+
+def describe(law: Law, args: argparse.Namespace) -> int:
+    """Print the description of a friction law; draw it."""
     model = with_values(law, args.set).warn()
     picture = Path(f"law-{model.law.name}.png") if args.plot == DEFAULT else args.plot
     if picture:
@@ -65,16 +105,8 @@ def run(args: argparse.Namespace) -> int:
     print(f"{law.name}: {law.title}\n\n  {law.equation}\n")
     table("parameters", model.law.fields)
     table("state", law.state_fields)
-    for choice in law.choices:
-        options = ", ".join(
-            f"{name} (default)" if name == choice.default else name for name in choice.options
-        )
-        print(f"{choice.name}: {options}")
-    if law.choices:
-        print()
-        for option, fields in brought(law):
-            table(f"with {option}", fields)
-    print(f"passive: {law.passive}\nsource: {'; '.join(law.source)}\n\nas a study's file has it:")
+    print_choices(law)
+    print(f"passive: {law.passive or 'not stated'}\n{source_line(law)}\n\nas a study's file has it:")
     written = args.name if args.name.endswith(".py") else law.name
     print(f"  law = {json.dumps(written, ensure_ascii=False)}")
     for name, option in model.law.chosen.items():
@@ -90,20 +122,60 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def check(law: Law) -> int:
-    """Hold the law to its contract, a line a check; 1 where it fails one."""
-    from stickslip.contract import examine
+def describe_control(law: ControlLaw, args: argparse.Namespace) -> int:
+    """Print the description of a control law."""
+    if args.plot is not None or args.set:
+        raise InputError("--plot and --set belong to friction laws; leave them out for a control law")
+    print(f"{law.name}: {law.title}\n\n  {law.equation}\n\nplace: {law.place}\n")
+    table("parameters", law.fields)
+    table("state", law.state_fields)
+    print_choices(law)
+    values = ", ".join(f"{f.name} = {law.example[f.name]}" for f in law.fields if f.name in law.example)
+    held = ', friction = "LAW"' if law.holds_friction else ""
+    written = args.name if args.name.endswith(".py") else law.name
+    print(f"{source_line(law)}\n\nin the table [controller] of a file:")
+    print(f"  {law.place} = {{law = {json.dumps(written, ensure_ascii=False)}, {values}{held}}}")
+    return 0
 
+
+def source_line(law: Configurable) -> str:
+    """Where it comes from."""
+    source: Sequence[str] = getattr(law, "source", ())
+    return f"source: {'; '.join(source) or 'none stated'}"
+
+
+def print_choices(law: Configurable) -> None:
+    """The choices, a line each, and the parameters that options bring."""
+    choices: Sequence[Choice] = law.choices
+    for choice in choices:
+        options = ", ".join(
+            f"{name} (default)" if name == choice.default else name for name in choice.options
+        )
+        print(f"{choice.name}: {options}")
+    if choices:
+        print()
+        for option, fields in brought(law):
+            table(f"with {option}", fields)
+
+
+def check(law: Any) -> int:
+    """Hold the law to its contract, a line a check; 1 where it fails one."""
+    from stickslip.contract import control_laws, examine
+
+    verdicts = control_laws.examine(law) if law.kind == "control law" else examine(law)
     failures = 0
-    for verdict in examine(law):
+    for verdict in verdicts:
         word = {True: "ok", False: "FAILED", None: "-"}[verdict.passed]
         failures += verdict.passed is False
         print(f"{word:<7} {verdict.name:<18} {verdict.text}", flush=True)
-    print(f"{law.name}: " + (f"{failures} checks failed" if failures else "passes what could be tried"))
+    said = (
+        f"{failures} check{'s' if failures > 1 else ''} failed" if failures else "passes what could be tried"
+    )
+    print(f"{law.name}: {said}")
     return 1 if failures else 0
 
 
-def brought(law: Law) -> Iterator[tuple[str, tuple[Field, ...]]]:
+def brought(law: Configurable) -> Iterator[tuple[str, tuple[Field, ...]]]:
     """The parameters that an option adds to those of the default."""
     from stickslip.spec import fields_of
 

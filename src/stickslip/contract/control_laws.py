@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.contract.angles import GIVES, in_other_angles, turns
-from stickslip.contract.description import bounds
+from stickslip.contract.description import bounds, required, source_of
 from stickslip.contract.rest import at_rest
 from stickslip.contract.specimens import (
     COUNT,
@@ -64,7 +64,7 @@ JUMP = 1e-12
 
 def description(law: ControlLaw) -> Verdict:
     """Texts and units are there."""
-    missing = [part for part in ("title", "equation", "source") if not getattr(law, part)]
+    missing = [part for part in required(law) if not getattr(law, part)]
     missing += [
         f"{part} of {f.name}"
         for f in (*law.fields, *law.state_fields)
@@ -75,7 +75,7 @@ def description(law: ControlLaw) -> Verdict:
         missing.append("delay")
     if missing:
         return failed("description", f"{', '.join(missing)} is missing")
-    return held("description", f"{law.place}; source: {'; '.join(law.source)}")
+    return held("description", f"{law.place}; {source_of(law)}")
 
 
 def subset(law: ControlLaw) -> Verdict:

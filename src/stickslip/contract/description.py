@@ -8,6 +8,7 @@ from typing import Any
 
 from stickslip.contract.motions import name_of, variants
 from stickslip.contract.verdict import Verdict, failed, held
+from stickslip.control_spec import ControlLaw
 from stickslip.errors import LawError, ParameterError
 from stickslip.spec import COMPILED, Configurable, Law, Mode
 from stickslip.subset import law_layouts, lower
@@ -16,7 +17,7 @@ from stickslip.subset import law_layouts, lower
 def description(law: Law) -> Verdict:
     """Texts, units and symbols are there, and functions that belong together come together."""
     name = "description"
-    missing = [part for part in ("title", "equation", "source") if not getattr(law, part)]
+    missing = [part for part in required(law) if not getattr(law, part)]
     fields = (*law.fields, *law.state_fields)
     missing += [
         f"{part} of {f.name}"
@@ -31,9 +32,21 @@ def description(law: Law) -> Verdict:
     switches = any(isinstance(f.par, Mode) for f in law.state_fields)
     if law.rate is not None and switches != (law.guards is not None):
         return failed(name, "a law with `rate` has `guards` and `switch` where it has modes, and only there")
-    return held(
-        name, f"{len(law.fields)} parameters, {len(law.state_fields)} states; source: {'; '.join(law.source)}"
-    )
+    return held(name, f"{len(law.fields)} parameters, {len(law.state_fields)} states; {source_of(law)}")
+
+
+def required(law: Law | ControlLaw) -> tuple[str, ...]:
+    """The texts that a law must have: one of the package also says where it comes from."""
+    function = law.written["step" if isinstance(law, Law) else "sample"]
+    ours = str(getattr(function, "__module__", "")).startswith("stickslip.")
+    return ("title", "equation", *(("source",) if ours else ()))
+
+
+def source_of(law: Law | ControlLaw) -> str:
+    """Where it comes from, for people."""
+    if law.source:
+        return f"source: {'; '.join(law.source)}"
+    return "no source is stated, which a law of your own may do; one that enters the package names its source"
 
 
 def subset(law: Law) -> Verdict:

@@ -38,8 +38,32 @@ class ControlBlock:
 
     Raises
     ------
-    UnknownName, ParameterError
+    UnknownName, ParameterError, LawError
         One line that names the thing, its value and the remedy.
+
+    Notes
+    -----
+    A control law of one's own is a file: ``stickslip law --template control > my_loop.py`` writes a complete one,
+    ``ControlBlock("my_loop.py", kp=6.0, kd=0.1, corner=600.0)`` takes it, and ``stickslip law my_loop.py --check``
+    tries it. In short::
+
+        from typing import Annotated, NamedTuple
+        from stickslip import ControlLaw, Par
+
+        class Params(NamedTuple):
+            kp: Annotated[float, Par("N·m/rad", "k_p", "gain", lower=0.0)]
+            kd: Annotated[float, Par("N·m·s/rad", "k_d", "gain", lower=0.0)]
+
+        def sample(y, z, p, u):
+            return p.kp * y.error + p.kd * (y.reference_velocity - y.velocity)
+
+        CONTROL_LAW = ControlLaw(
+            "my_loop", Params, sample, "loop", title="PD", equation="T = k_p e + k_d e'", source=(),
+            example={"kp": 6.0, "kd": 0.1},
+        )
+
+    The signals ``y``, and what else a law may have: ``help("stickslip.control_spec")``, and
+    docs/howto/own_control_law.md in the source of the package.
     """
 
     __slots__ = ("friction", "law", "parameters")
