@@ -125,3 +125,22 @@ def test_its_time_is_that_of_cases_drawn_and_of_their_checks_not_of_the_nominal_
 def test_the_log_that_ships_can_be_had_alone(tmp_path, capsys):
     assert main(["demo", "--log", str(tmp_path / "log.csv")]) == 0
     assert main(["doctor", str(tmp_path / "log.csv")]) == 0
+
+
+def test_what_warm_up_does_not_know_is_said_to_be_compiled_once(told):
+    """It was "`stickslip warm-up` does it beforehand", after a warm-up."""
+    told.started(compiling.OWN_WORDS)
+    told.started()
+    Clock.last.ring()
+    said = told.stream.getvalue()
+    assert "this controller or law" in said
+    assert "warm-up" not in said
+
+
+def test_the_texts_of_laws_are_told_from_the_kernels():
+    from stickslip.jit.kept import TRANSLATED, loaded
+    from stickslip.simulation.compiled_controller import measured_position
+
+    text = "from stickslip.jit import compile_inner\n\n\n@compile_inner\ndef once(x):\n    return x\n"
+    assert loaded("told_from_kernels", text).once.py_func.__module__.startswith(TRANSLATED)
+    assert not measured_position.py_func.__module__.startswith(TRANSLATED)

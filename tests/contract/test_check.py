@@ -103,7 +103,7 @@ def test_the_command_ends_with_1_where_a_check_fails(law_of, tmp_path, capsys, m
     assert main(["law", str(tmp_path / "law.py"), "--check"]) == 1
     out = capsys.readouterr().out
     assert "FAILED  steady" in out
-    assert out.endswith("dahl-example: 1 checks failed\n")
+    assert out.endswith("dahl-example: 1 check failed\n")
     assert main(["law", str(tmp_path / "law.py"), "--check", "--set", "fc=0.1"]) == 2
     assert "--check" in capsys.readouterr().err
 
