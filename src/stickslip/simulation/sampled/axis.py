@@ -234,10 +234,18 @@ def level_from(curve: Callable[..., float], p: Any, scale: float) -> tuple[float
 def glide_of(a: Any) -> Array:
     """What velocity, slipping force, held torque and pull make of displacement, velocity and slipping force."""
     attraction = 0.0 if a["kind"] == BENDS else a["attraction"]
+    return glide_on(
+        *(float(x) for x in (a["inertia"], a["viscous"], attraction, a["level"], a["sample_time"]))
+    )
+
+
+@functools.lru_cache(maxsize=4096)
+def glide_on(inertia: float, viscous: float, attraction: float, level: float, time: float) -> Array:
+    """The same by its numbers; kept, as it takes as long as a few hundred samples and a study has few of them."""
     rate = np.zeros((5, 5))
     rate[0, 1] = 1.0
-    rate[1, 1:4] = -a["viscous"], -1.0, 1.0
-    rate[1] /= a["inertia"]
-    if a["level"] > 0.0:  # else nothing slips against anything
-        rate[2, 2], rate[2, 4] = -attraction / a["level"], attraction
-    return exponential(rate * float(a["sample_time"]))[:3, 1:]
+    rate[1, 1:4] = -viscous, -1.0, 1.0
+    rate[1] /= inertia
+    if level > 0.0:  # else nothing slips against anything
+        rate[2, 2], rate[2, 4] = -attraction / level, attraction
+    return exponential(rate * time)[:3, 1:]

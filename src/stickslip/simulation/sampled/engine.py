@@ -42,9 +42,18 @@ from stickslip.simulation.compiled_controller import Sampled, compiled, measured
 from stickslip.simulation.metrics import settle_band_of
 from stickslip.simulation.recorded_input.contact import Plant
 from stickslip.simulation.sampled.axis import axis_of, general_axis, not_located
-from stickslip.simulation.sampled.general import Contact, act_on, contact_of, hold, plant_of, step_on
+from stickslip.simulation.sampled.general import (
+    Contact,
+    Held,
+    act_on,
+    contact_of,
+    held_of,
+    hold,
+    plant_of,
+    step_on,
+)
 from stickslip.simulation.sampled.modes import creep, friction, rest, sign
-from stickslip.simulation.sampled.output import PROGRESS, Output, measure, put_out, with_room, write
+from stickslip.simulation.sampled.output import PROGRESS, Grid, Output, measure, put_out, with_room, write
 from stickslip.simulation.sampled.rates import HOLDS, RESTS, SLIPS, STEPS, STUCK, never_sticks
 from stickslip.simulation.sampled.slip import slip
 from stickslip.simulation.sampled.stick import stick
@@ -59,6 +68,23 @@ class Control(NamedTuple):
     """The controller and its reference."""
 
     sampled: Sampled
+    profile: int
+    reference_parameters: Any
+    encoder: float
+    surroundings: Any
+    motion: Any
+
+
+class Acting(NamedTuple):
+    """A `Control` by addresses: references to arrays would be counted at every sample."""
+
+    controller: int
+    settings: Any
+    memory: Any
+    state: Any
+    parameters: Any
+    compensation: int
+    fault: int
     profile: int
     reference_parameters: Any
     encoder: float
@@ -121,42 +147,71 @@ def run(case: Case) -> Outcome:
 def stops_of(case: Case) -> Array:
     """When a stretch ends, how long it is, and whether the controller samples there (1); shape (n, 3)."""
     period, duration = float(case.numbers[SAMPLE_TIME]), float(case.numbers[DURATION])
-    samples = period * np.arange(1, math.ceil(duration / period - 1e-9))
-    others = np.concatenate([case.breaks, case.grid[case.grid > 0.0]])
-    times = np.concatenate([samples, others])
-    marks = np.concatenate([np.ones(samples.size), np.zeros(others.size)])
-    # Stable: the controller's own stop stands before another at the same time.
-    order = np.argsort(times, kind="stable")
-    times, marks = times[order], marks[order]
-    first = np.concatenate([[True], np.diff(times) > 1e-12 * max(1.0, duration)])
-    out = np.zeros((int(first.sum()), 3))
-    out[:, 0] = times[first]
-    out[:, 1] = np.diff(out[:, 0], prepend=0.0)
-    np.maximum.at(out[:, 2], np.cumsum(first) - 1, marks)
-    whole = np.abs(out[:, 1] - period) < 1e-9 * period
-    # Exactly the sample time, so that the flow kept for it serves.
-    out[whole, 1] = period
-    return out
+    others = np.sort(np.concatenate([case.breaks, case.grid[case.grid > 0.0]]), kind="stable")
+    return stops_among(period, math.ceil(duration / period - 1e-9) - 1, others, 1e-12 * max(1.0, duration))
+
+
+@kernel()
+def stops_among(period: float, samples: int, others: Any, apart: float) -> Any:
+    """The stops of `samples` samples and of other times, s, ascending; one where they lie no further than `apart`."""
+    out = np.zeros((samples + others.size, 3))
+    count, sample, other = 0, 1, 0
+    before, now = -math.inf, 0.0
+    while sample <= samples or other < others.size:
+        # The controller's own stop stands before another at the same time.
+        acts = sample <= samples and (other == others.size or period * sample <= others[other])
+        if acts:
+            now = period * sample
+            sample += 1
+        else:
+            now = others[other]
+            other += 1
+        if now - before > apart:
+            length = now - out[count - 1, 0] if count > 0 else now
+            # Exactly the sample time, so that the flow kept for it serves.
+            out[count, 0], out[count, 1] = now, period if abs(length - period) < 1e-9 * period else length
+            count += 1
+        if acts:
+            out[count - 1, 2] = 1.0
+        before = now
+    return out[:count]
 
 
 # ---- the loop over time ------------------------------------------------------------------------------------------
 
 
 @kernel(exact=False)
+def acting(c: Control) -> Acting:
+    """The addresses of a controller and its reference."""
+    s = c.sampled
+    return Acting(
+        s.address, pointer(s.settings, 0), pointer(s.memory, 0), pointer(s.state, 0), pointer(s.parameters, 0),
+        s.compensation, s.fault, c.profile, pointer(c.reference_parameters, 0), c.encoder,
+        pointer(c.surroundings, 0), pointer(c.motion, 0),
+    )  # fmt: skip
+
+
+@kernel(exact=False)
 def integrate(
-    control: Control, axes: Any, states: Any, contact: Contact, stops: Any, output: Output
+    controlled: Control, axes: Any, states: Any, contact: Contact, stops: Any, output: Output
 ) -> tuple[Any, int]:  # fmt: skip
     """Run from 0 to the last stop; returns rows and code."""
-    axis, z, reached, grid = axes[0], states[0], output.reached[0], output.grid
+    axis, z, reached, grid = (
+        axes[0],
+        states[0],
+        output.reached[0],
+        Grid(pointer(output.grid, 0), output.grid.size),
+    )
     starts = states.copy()
-    rows = np.zeros((grid.size + 256, len(COLUMNS)))
+    rows = np.empty((grid.size + 256, len(COLUMNS)))
+    written = pointer(rows, 0)
     storm = np.full(STORM_EVENTS, -1.0)
     code = DONE
-    plant = plant_of(contact)
-    act(control, axis, z, contact, plant, 0.0)
+    control, plant, held = acting(controlled), plant_of(contact), held_of(contact)
+    act(control, axis, z, held, plant, 0.0)
     if not math.isfinite(z.torque):
         code = NO_TORQUE
-    put_out(control, axis, z, 0.0, grid, reached, rows)
+    put_out(control, axis, z, 0.0, grid, reached, written)
     for i in range(stops.shape[0]):
         left = stops[i, 1]
         while left > 0.0 and code == DONE:
@@ -164,7 +219,7 @@ def integrate(
             if axis.metered:
                 starts[0] = z
             time = stops[i, 0] - left
-            taken = advance(axis, z, contact, plant, time, left)
+            taken = advance(axis, z, held, plant, time, left)
             left = left - taken if left - taken > 1e-12 * axis.sample_time else 0.0
             z.steps += 1
             if axis.metered and taken > 0.0:
@@ -173,7 +228,8 @@ def integrate(
                 # Room for the rows of the output times to come is kept.
                 if rows.shape[0] - reached.rows <= grid.size - reached.outputs:
                     rows = with_room(rows)
-                write(control, axis, z, time + taken, 1.0, reached, rows)
+                    written = pointer(rows, 0)
+                write(control, axis, z, time + taken, 1.0, reached, written)
                 code = stormy(z, time + taken, storm)
                 if z.mode < STEPS:
                     refresh(axis, z)
@@ -187,22 +243,22 @@ def integrate(
         if code != DONE:
             break
         if stops[i, 2] > 0.0:
-            act(control, axis, z, contact, plant, stops[i, 0])
+            act(control, axis, z, held, plant, stops[i, 0])
             if not math.isfinite(z.torque):
                 code = NO_TORQUE
-        put_out(control, axis, z, stops[i, 0], grid, reached, rows)
+        put_out(control, axis, z, stops[i, 0], grid, reached, written)
     if axis.metered:
         close_standstill(output.acc, reached.time)
     return rows[: reached.rows], code
 
 
 @kernel(exact=False, inline=True)
-def advance(axis: Any, z: Any, contact: Contact, plant: Plant, t: float, left: float) -> float:
+def advance(axis: Any, z: Any, held: Held, plant: Plant, t: float, left: float) -> float:
     """Move on by at most `left` s under the held torque, until something changes; returns the time taken."""
     if z.mode == STEPS:
-        return step_on(axis, z, contact, plant, t, left)
+        return step_on(axis, z, held, plant, t, left)
     if z.mode == HOLDS:
-        return hold(axis, z, contact, plant, t, left)
+        return hold(axis, z, held, plant, t, left)
     if z.mode == STUCK:
         return stick(axis, z, left)
     if z.mode == SLIPS:
@@ -213,22 +269,22 @@ def advance(axis: Any, z: Any, contact: Contact, plant: Plant, t: float, left: f
 
 
 @kernel(exact=False, inline=True)
-def act(control: Control, axis: Any, z: Any, contact: Contact, plant: Plant, t: float) -> None:
+def act(control: Acting, axis: Any, z: Any, held: Held, plant: Plant, t: float) -> None:
     """Let the controller sample, and hold what it answers."""
-    motion, sampled = control.motion, control.sampled
-    call_profile(control.profile, t + NUDGE, pointer(control.reference_parameters, 0), pointer(motion, 0))
+    motion = control.motion
+    call_profile(control.profile, t + NUDGE, control.reference_parameters, motion)
     control.surroundings[0], control.surroundings[3] = z.position + z.moved, t
     z.torque = call_sample(
-        sampled.address, measured_position(z.position + z.moved, control.encoder), motion[0] - NUDGE * motion[1],
-        motion[1], motion[2], pointer(sampled.settings, 0), pointer(sampled.memory, 0),
-        pointer(sampled.state, 0), pointer(sampled.parameters, 0), pointer(control.surroundings, 0),
+        control.controller, measured_position(z.position + z.moved, control.encoder),
+        motion[0] - NUDGE * motion[1], motion[1], motion[2], control.settings, control.memory, control.state,
+        control.parameters, control.surroundings,
     )  # fmt: skip
-    if sampled.memory[sampled.fault] != 0.0:
+    if control.memory[control.fault] != 0.0:
         z.torque = math.nan
     if z.mode < STEPS:
         refresh(axis, z)
     else:
-        act_on(axis, z, contact, plant, t)
+        act_on(axis, z, held, plant, t)
 
 
 @kernel(exact=False)

@@ -63,6 +63,21 @@ def contact_of(case: Case) -> Contact:
     )  # fmt: skip
 
 
+class Held(NamedTuple):
+    """What general steps ask of a law beside its `Plant`. No arrays: references to them are counted at every call."""
+
+    holding: int
+    band: float
+    kept: Any
+    """address of the law's state while a step is tried"""
+
+
+@kernel(exact=False)
+def held_of(c: Contact) -> Held:
+    """The part of a contact that is handed on at every stretch."""
+    return Held(c.holding, c.band, pointer(c.kept, 0))
+
+
 @kernel(exact=False)
 def plant_of(c: Contact) -> Plant:
     """The addresses of the contact's arrays, its root finders ready."""
@@ -86,13 +101,13 @@ def torque_at(plant: Plant, v0: float, v1: float, h: float) -> float:
 
 
 @kernel(exact=False)
-def edge_of(c: Contact, direction: float) -> float:
+def edge_of(c: Held, direction: float) -> float:
     """The velocity at which a law that jumps begins to slide, rad/s."""
     return direction * max(c.band, TINY)
 
 
 @kernel(exact=False)
-def act_on(axis: Any, z: Any, c: Contact, plant: Plant, t: float) -> None:
+def act_on(axis: Any, z: Any, c: Held, plant: Plant, t: float) -> None:
     """The torque on the axis is another one now: its acceleration, and whether a contact lets go."""
     u = plant.surroundings
     u[AROUND], u[TIME], u[APPLIED] = z.position, t, z.torque
@@ -104,7 +119,7 @@ def act_on(axis: Any, z: Any, c: Contact, plant: Plant, t: float) -> None:
 
 
 @kernel(exact=False)
-def hold(axis: Any, z: Any, c: Contact, plant: Plant, t: float, left: float) -> float:
+def hold(axis: Any, z: Any, c: Held, plant: Plant, t: float, left: float) -> float:
     """Rest for `left` at most, or let go; returns the time taken. In a band (Karnopp's) momentum gathers meanwhile."""
     u = plant.surroundings
     u[AROUND], u[TIME], u[APPLIED] = z.position, t, z.torque
@@ -139,7 +154,7 @@ def hold(axis: Any, z: Any, c: Contact, plant: Plant, t: float, left: float) -> 
 
 
 @kernel(exact=False)
-def landing(axis: Any, z: Any, c: Contact, plant: Plant, h: float) -> tuple[float, float]:
+def landing(axis: Any, z: Any, c: Held, plant: Plant, h: float) -> tuple[float, float]:
     """When an axis that is below the edge after h comes to rest, s, and how its acceleration bends until then.
 
     From the accelerations now and there; ``trial`` holds the law's state there.
@@ -151,7 +166,7 @@ def landing(axis: Any, z: Any, c: Contact, plant: Plant, h: float) -> tuple[floa
 
 
 @kernel(exact=False)
-def land(axis: Any, z: Any, c: Contact, plant: Plant, h: float, bend: float) -> float:
+def land(axis: Any, z: Any, c: Held, plant: Plant, h: float, bend: float) -> float:
     """Come to rest after h, which is returned; ``trial`` is of `landing`."""
     keep(plant)
     z.position += 0.5 * h * (z.velocity + z.direction * c.band) - h * h * bend / 12.0
@@ -161,9 +176,9 @@ def land(axis: Any, z: Any, c: Contact, plant: Plant, h: float, bend: float) -> 
 
 
 @kernel(exact=False)
-def step_on(axis: Any, z: Any, c: Contact, plant: Plant, t: float, left: float) -> float:
+def step_on(axis: Any, z: Any, c: Held, plant: Plant, t: float, left: float) -> float:
     """One step of a moving axis, at most `left` s long; returns the time taken."""
-    state, kept, moving = plant.state, pointer(c.kept, 0), plant.motion
+    state, kept, moving = plant.state, c.kept, plant.motion
     u, q, v = plant.surroundings, z.position, z.velocity
     if c.holding != 0 and v != 0.0:
         z.direction = math.copysign(1.0, v)

@@ -9,6 +9,7 @@ import numpy as np
 
 from stickslip.jit import call_profile, kernel, pointer
 from stickslip.simulation._meter import MAX_WINDOW, meter
+from stickslip.simulation.case_arrays import COLUMNS
 from stickslip.simulation.exact.flow import flow, free_motion, linear
 from stickslip.simulation.sampled.modes import friction
 from stickslip.simulation.sampled.rates import CREEPS, STUCK
@@ -53,34 +54,41 @@ class Output(NamedTuple):
     nodes: Any
 
 
+class Grid(NamedTuple):
+    """Output times: their address, s, and how many."""
+
+    times: Any
+    size: int
+
+
 @kernel(exact=False, inline=True)
 def write(control: Any, axis: Any, z: Any, t: float, event: float, reached: Any, rows: Any) -> None:
-    """Write the row at t, for which `rows` have room.
+    """Write the row at t, for which there is room at the address `rows`.
 
-    Single elements, and no array handed back: counting references to arrays would cost more than the row.
+    An address and no array: counting references to arrays would cost more than the row.
     """
-    i, motion = reached.rows, control.motion
-    call_profile(control.profile, t, pointer(control.reference_parameters, 0), pointer(motion, 0))
-    rows[i, 0], rows[i, 1], rows[i, 2] = t, motion[0], motion[1]
-    rows[i, 3], rows[i, 4] = z.position + z.moved, z.velocity
-    rows[i, 5], rows[i, 6] = z.torque, friction(axis, z)
-    rows[i, 7] = control.sampled.memory[control.sampled.compensation]
-    rows[i, 8] = event
-    reached.rows = i + 1
+    row, motion = pointer(rows, reached.rows * len(COLUMNS)), control.motion
+    call_profile(control.profile, t, control.reference_parameters, motion)
+    row[0], row[1], row[2] = t, motion[0], motion[1]
+    row[3], row[4] = z.position + z.moved, z.velocity
+    row[5], row[6] = z.torque, friction(axis, z)
+    row[7] = control.memory[control.compensation]
+    row[8] = event
+    reached.rows += 1
 
 
 @kernel(exact=False, inline=True)
-def put_out(control: Any, axis: Any, z: Any, t: float, grid: Any, reached: Any, rows: Any) -> None:
+def put_out(control: Any, axis: Any, z: Any, t: float, grid: Grid, reached: Any, rows: Any) -> None:
     """Write the rows of the output times up to t."""
-    while reached.outputs < grid.size and grid[reached.outputs] <= t + 1e-12 * max(1.0, t):
-        write(control, axis, z, grid[reached.outputs], 0.0, reached, rows)
+    while reached.outputs < grid.size and grid.times[reached.outputs] <= t + 1e-12 * max(1.0, t):
+        write(control, axis, z, grid.times[reached.outputs], 0.0, reached, rows)
         reached.outputs += 1
 
 
 @kernel(exact=False)
 def with_room(rows: Any) -> Any:
     """Twice as many rows, the first ones those that are there."""
-    grown = np.zeros((2 * rows.shape[0], rows.shape[1]))
+    grown = np.empty((2 * rows.shape[0], rows.shape[1]))
     grown[: rows.shape[0]] = rows
     return grown
 
@@ -121,9 +129,7 @@ def measure(control: Any, axis: Any, was: Any, z: Any, t: float, h: float, outpu
         for i in range(5):
             x = h * (window + 0.25 * i) / windows
             inside = min(max(t + x, t + beside), t + h - beside)
-            call_profile(
-                control.profile, inside, pointer(control.reference_parameters, 0), pointer(control.motion, 0)
-            )
+            call_profile(control.profile, inside, control.reference_parameters, control.motion)
             position, v, a = moved_after(axis, was, z, h, x)
             nodes[0, i] = control.motion[0] - position
             nodes[1, i] = control.motion[1] - v
@@ -132,5 +138,5 @@ def measure(control: Any, axis: Any, was: Any, z: Any, t: float, h: float, outpu
             nodes[4, i] = control.motion[1]
             nodes[5, i] = was.torque
             nodes[6, i] = was.torque - axis.inertia * a
-            nodes[7, i] = control.sampled.memory[control.sampled.compensation]
+            nodes[7, i] = control.memory[control.compensation]
         meter(output.acc, output.turns, t + h * window / windows, h / windows, nodes)
