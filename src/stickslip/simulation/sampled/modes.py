@@ -7,16 +7,17 @@ from typing import Any
 
 from stickslip.jit import kernel
 from stickslip.simulation.sampled.rates import (
-    BENDS,
     CREEPS,
     FOLLOWS,
     LEVELS,
+    RELAXES,
     RESTS,
     SLIPS,
     STEPS,
     STUCK,
     bends_by,
     curve_at,
+    level_now,
     never_sticks,
     spring_of,
 )
@@ -72,14 +73,22 @@ def heaviest(axis: Any, moved: float, direction: float) -> float:
 
 @kernel(exact=False)
 def stays_below(axis: Any, most: float, piece: Stretch, way: float) -> bool:
-    """Whether loads of at most `most` N·m cannot meet the curve in a stretch between two velocities of one sign.
+    """Whether loads of at most `most` N·m cannot meet the curve in a stretch between two velocities of one sign."""
+    if most < axis.lowest:
+        return True
+    return keeps_below(axis, most, piece, way, breaks_at(axis, piece.v0), breaks_at(axis, piece.v1))
+
+
+@kernel(exact=False)
+def keeps_below(axis: Any, most: float, piece: Stretch, way: float, begin: float, end: float) -> bool:
+    """The same where the curve at both ends is known, N·m.
 
     For a curve that rises or falls throughout the velocities of the stretch; its tangents bound these where the
     acceleration changes its sign.
     """
-    if most < axis.lowest:
-        return True
     fastest, slowest = max(way * piece.v0, way * piece.v1), min(way * piece.v0, way * piece.v1)
+    if piece.a0 * piece.a1 >= 0.0 and slowest >= 0.0:
+        return most < min(begin, end)
     if piece.a0 * piece.a1 < 0.0:
         bulge = 0.5 * piece.time * max(abs(piece.a0), abs(piece.a1))
         fastest, slowest = fastest + bulge, slowest - bulge
@@ -94,7 +103,7 @@ def fold(axis: Any, z: Any) -> None:
     relaxed = math.exp(-z.relaxed)
     level = 0.0
     if axis.kind == FOLLOWS:
-        level = z.direction * curve_at(axis, z.velocity)
+        level = z.direction * level_now(axis, z)
     elif z.share > 0.0:
         level = (z.slipping - relaxed * z.slipped_from) / z.share
     for i in range(axis.count):
@@ -131,7 +140,7 @@ def gather(axis: Any, z: Any) -> None:
 def break_away(axis: Any, z: Any, direction: float) -> None:
     """Let the elements slip whose load has reached their share of the curve; the heaviest in any case."""
     fold(axis, z)
-    level = breaks_at(axis, z.velocity)
+    level = axis.elastic if axis.elastic > 0.0 else level_now(axis, z)
     enough = min(level * (1.0 - AT_ONCE), heaviest(axis, 0.0, direction))
     for i in range(axis.count):
         spring = spring_of(axis, i)
@@ -221,9 +230,9 @@ def friction(axis: Any, z: Any) -> float:
     if z.mode == STUCK:
         return force + axis.damped * v
     force += axis.viscous * v
-    level = curve_at(axis, v)
+    if axis.kind == RELAXES:
+        return force + z.slipping
+    level = level_now(axis, z)
     if axis.kind == FOLLOWS:
         return force + z.share * z.direction * level
-    if axis.kind == BENDS:
-        return force + z.slipping + axis.lag * bends_by(axis, v, z.slipping, level, z.direction)
-    return force + z.slipping
+    return force + z.slipping + axis.lag * bends_by(axis, v, z.slipping, level, z.direction)

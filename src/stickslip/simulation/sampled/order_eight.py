@@ -61,7 +61,7 @@ def text() -> str:
         "",
         "@kernel(exact=False)",
         "def attempt(m, start, h):",
-        "    v0, s0, a0, g0, q0 = start",
+        "    v0, s0, a0, g0, q0, _ = start",
     ]
     for i, row in enumerate(STAGES, start=1):
         lines += [

@@ -46,14 +46,15 @@ STATE = np.dtype(
     [
         *((name, np.float64) for name in (
             "position", "moved", "velocity", "acceleration", "torque", "direction", "slipping", "slipped_from",
-            "relaxed", "held", "spring", "share", "next", "goal",
+            "relaxed", "held", "spring", "share", "next", "goal", "level", "level_at",
         )),
         *((name, np.int64) for name in ("mode", "events", "steps", "rejected", "failed")),
     ]
 )  # fmt: skip
 """The motion at one time. ``moved`` is the displacement since the springs' forces were written down, rad; ``held`` and
 ``spring`` are force and stiffness of the sticking ones, ``slipping`` and ``share`` force and share of the others;
-``goal`` is where a stuck axis would come to rest, or the velocity at which one on its steep slope would go on."""
+``goal`` is where a stuck axis would come to rest, or the velocity at which one on its steep slope would go on.
+``level`` is the curve at the velocity ``level_at``, where it was called last; 0 before that."""
 SPRING = np.dtype([(name, np.float64) for name in ("stiffness", "share", "force", "slips")])
 """One element: ``force`` in N·m where ``moved`` is 0; ``slips`` is 1 or 0."""
 SPRING_SIZE = SPRING.itemsize // 8
@@ -97,6 +98,8 @@ class Start(NamedTuple):
     """rate of the slipping force, N·m/s"""
     decay: float
     """rate of its relaxation, 1/s"""
+    level: float
+    """the curve there, N·m"""
 
 
 class Trial(NamedTuple):
@@ -148,6 +151,12 @@ def curve_at(axis: Any, v: float) -> float:
     return call_value(axis.curve, v, pointer_at(axis.parameters))
 
 
+@kernel(exact=False, inline=True)
+def level_now(axis: Any, z: Any) -> float:
+    """s(v) now, N·m: not called again where the last step ended with it."""
+    return z.level if z.level > 0.0 and z.velocity == z.level_at else curve_at(axis, z.velocity)
+
+
 @kernel(exact=False)
 def grows_by(growth: int, parameters: int, stiffness: float, v: float, load: float, level: float) -> float:
     """Rate of a bristle's force by the law's own growth, N·m/s.
@@ -168,7 +177,12 @@ def bends_by(axis: Any, v: float, s: float, level: float, way: float) -> float:
 @kernel(exact=False, inline=True)
 def rates(m: Slip, d: float, v: float, s: float) -> tuple[float, float, float]:
     """Acceleration, rate of the slipping force and rate of its relaxation, d after the step's start."""
-    level = curve_at(m, v)
+    return rates_on(m, d, v, s, curve_at(m, v))
+
+
+@kernel(exact=False, inline=True)
+def rates_on(m: Slip, d: float, v: float, s: float, level: float) -> tuple[float, float, float]:
+    """The same where the curve is known."""
     ds = 0.0
     decay = 0.0
     force = s
@@ -186,8 +200,9 @@ def rates(m: Slip, d: float, v: float, s: float) -> tuple[float, float, float]:
 @kernel(exact=False, inline=True)
 def start_of(m: Slip, z: Any) -> Start:
     """Where the next step starts."""
-    a, ds, decay = rates(m, 0.0, z.velocity, z.slipping)
-    return Start(z.velocity, z.slipping, a, ds, decay)
+    level = level_now(m, z)
+    a, ds, decay = rates_on(m, 0.0, z.velocity, z.slipping, level)
+    return Start(z.velocity, z.slipping, a, ds, decay, level)
 
 
 @kernel(exact=False, inline=True)

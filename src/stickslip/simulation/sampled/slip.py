@@ -11,7 +11,8 @@ import math
 from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
-from stickslip.simulation.sampled.modes import break_away, heaviest, sign, stays_below, turn
+from stickslip.simulation.sampled.bracket import bracket, narrowed, where_next
+from stickslip.simulation.sampled.modes import break_away, heaviest, keeps_below, sign, turn
 from stickslip.simulation.sampled.order_eight import attempt
 from stickslip.simulation.sampled.rates import (
     BENDS,
@@ -22,6 +23,7 @@ from stickslip.simulation.sampled.rates import (
     curve_at,
     never_sticks,
     rates,
+    rates_on,
     slip_of,
     start_of,
 )
@@ -50,6 +52,8 @@ class End(NamedTuple):
     """whether the axis turns there"""
     breaks: bool
     """whether an element breaks away"""
+    level: float
+    """the curve there, N·m; 0 where it was not called there"""
 
 
 @kernel(exact=False)
@@ -83,6 +87,7 @@ def slip(axis: Any, z: Any, left: float) -> float:
     z.moved, z.velocity, z.slipping = z.moved + trial.moved, trial.velocity, trial.slipping
     z.relaxed += trial.relaxed
     z.acceleration = end.acceleration
+    z.level, z.level_at = end.level, trial.velocity
     if end.breaks:
         break_away(axis, z, way)
     elif end.turns:
@@ -117,17 +122,18 @@ def acceleration_after(m: Slip, trial: Trial) -> float:
 
 
 @kernel(exact=False, inline=True)
-def stretch_of(m: Slip, start: Start, trial: Trial) -> Stretch:
-    """What both ends of a step say of the motion inside it."""
-    a1 = acceleration_after(m, trial)
-    return Stretch(trial.time, trial.moved, start.velocity, start.acceleration, trial.velocity, a1)
+def stretch_of(m: Slip, start: Start, trial: Trial) -> tuple[Stretch, float]:
+    """What both ends of a step say of the motion inside it, and the curve at its end, N·m."""
+    level = curve_at(m, trial.velocity)
+    a1, _, _ = rates_on(m, trial.moved, trial.velocity, trial.slipping, level)
+    return Stretch(trial.time, trial.moved, start.velocity, start.acceleration, trial.velocity, a1), level
 
 
 @kernel(exact=False)
 def ended(axis: Any, z: Any, m: Slip, start: Start, trial: Trial, left: float) -> End:
     """Cut an accepted step where something ends, or lead it on to the turn that lies just ahead."""
     way, edge = z.direction, axis.layer
-    whole = stretch_of(m, start, trial)
+    whole, level = stretch_of(m, start, trial)
     turns = breaks = False
     gap, braking = way * trial.velocity - edge, -way * whole.a1
     if gap < 0.0:
@@ -141,15 +147,17 @@ def ended(axis: Any, z: Any, m: Slip, start: Start, trial: Trial, left: float) -
         low = lowest(whole, way)
         if way * velocity_in(whole, low) < edge + 0.1 * abs(start.velocity - trial.velocity):
             trial = attempt(m, start, low)
-            whole = stretch_of(m, start, trial)
+            whole, level = stretch_of(m, start, trial)
             if way * trial.velocity < edge:
                 trial, turns = arrival(axis, m, start, whole, trial), True
     if z.spring > 0.0:
         if turns:
-            whole = stretch_of(m, start, trial)
-        trial, breaks = next_break(axis, z, m, start, whole, trial)
+            whole, level = stretch_of(m, start, trial)
+        trial, breaks, level = next_break(axis, z, m, start, whole, trial, level)
         turns = turns and not breaks and way * trial.velocity < edge + 1e-9
-    return End(trial, whole.a1, turns, breaks)
+    elif turns:
+        level = 0.0
+    return End(trial, whole.a1, turns, breaks, level)
 
 
 @kernel(exact=False)
@@ -280,31 +288,35 @@ def at_velocity(m: Slip, trial: Trial, goal: float, span: float) -> Trial:
 
 @kernel(exact=False)
 def next_break(
-    axis: Any, z: Any, m: Slip, start: Start, whole: Stretch, trial: Trial
-) -> tuple[Trial, bool]:  # fmt: skip
-    """Cut the step where the next element breaks away; whether one does."""
+    axis: Any, z: Any, m: Slip, start: Start, whole: Stretch, trial: Trial, level: float
+) -> tuple[Trial, bool, float]:  # fmt: skip
+    """Cut the step where the next element breaks away; whether one does, and the curve there (`level` at its end)."""
     way, v0 = z.direction, start.velocity
-    load0 = heaviest(axis, z.moved, way)
-    if max(load0, heaviest(axis, z.moved + trial.moved, way)) < axis.lowest:
-        return trial, False
-    if way * v0 > 0.0 and load0 >= curve_at(axis, v0):
-        return Trial(0.0, 0.0, v0, z.slipping, 0.0, 0.0), True
+    load0, last = heaviest(axis, z.moved, way), heaviest(axis, z.moved + trial.moved, way)
+    if max(load0, last) < axis.lowest:
+        return trial, False, level
+    if way * v0 > 0.0 and load0 >= start.level:
+        return Trial(0.0, 0.0, v0, z.slipping, 0.0, 0.0), True, start.level
     h = whole.time
     t, d = 0.0, h
-    w0, b0, before = v0, start.acceleration, 0.0
+    w0, b0, before, level0 = v0, start.acceleration, 0.0, start.level
     while t < h:
         d = min(d, h - t)
-        moved, w1, b1 = within(whole, t + d)
-        load1 = heaviest(axis, z.moved + moved, way)
-        if load1 >= axis.lowest and load1 >= curve_at(axis, w1):
+        moved, w1, b1, load1, level1 = whole.moved, whole.v1, whole.a1, last, level
+        if t + d < h:
+            moved, w1, b1 = within(whole, t + d)
+            load1, level1 = heaviest(axis, z.moved + moved, way), curve_at(axis, w1)
+        most = max(load0, load1)
+        if load1 >= level1:
             return located(axis, z, m, start, whole, t, t + d)
         piece = Stretch(d, moved - before, w0, b0, w1, b1)
-        if stays_below(axis, max(load0, load1), piece, way) or d <= FINEST * axis.sample_time:
-            t, load0, w0, b0, before = t + d, load1, w1, b1, moved
+        below = most < axis.lowest or keeps_below(axis, most, piece, way, level0, level1)
+        if below or d <= FINEST * axis.sample_time:
+            t, load0, w0, b0, before, level0 = t + d, load1, w1, b1, moved, level1
             d *= 2.0
         else:
             d *= 0.5
-    return trial, False
+    return trial, False, level
 
 
 @kernel(exact=False)
@@ -315,46 +327,41 @@ def looked(axis: Any, z: Any, whole: Stretch, t: float) -> float:
 
 
 @kernel(exact=False)
-def over(axis: Any, z: Any, trial: Trial) -> float:
-    """How far the heaviest load lies above the curve at the end of a real step, N·m."""
-    return heaviest(axis, z.moved + trial.moved, z.direction) - curve_at(axis, trial.velocity)
+def over(axis: Any, z: Any, trial: Trial) -> tuple[float, float]:
+    """How far the heaviest load lies above the curve at the end of a real step, and the curve there, N·m."""
+    level = curve_at(axis, trial.velocity)
+    return heaviest(axis, z.moved + trial.moved, z.direction) - level, level
 
 
 @kernel(exact=False)
 def located(
     axis: Any, z: Any, m: Slip, start: Start, whole: Stretch, low: float, high: float
-) -> tuple[Trial, bool]:  # fmt: skip
-    """The step between low and high at whose end the heaviest load meets the curve, and whether it does.
+) -> tuple[Trial, bool, float]:  # fmt: skip
+    """The step between low and high at whose end the heaviest load meets the curve, whether it does, and the curve.
 
-    The place is found on the quintic of the whole step (Illinois' rule), then corrected on real steps.
+    The place is found on the quintic of the whole step, then corrected on real steps.
     """
     h = whole.time
-    f_low = min(looked(axis, z, whole, low), 0.0)
-    f_high = max(looked(axis, z, whole, high), 0.0)
-    begin, end = low, high
-    t = high
+    b = bracket(low, high, looked(axis, z, whole, low), looked(axis, z, whole, high))
     for i in range(ROOT_STEPS):
-        if f_high <= axis.near or high - low <= 1e-12 * h:
+        if b.excess <= axis.near or b.high - b.low <= 1e-12 * h:
             break
-        slope = (f_high - f_low) / (high - low)
-        t = high - f_high / slope
-        if i > 10 or not low < t < high:
-            t = 0.5 * (low + high)
-        f = looked(axis, z, whole, t)
-        if f >= 0.0:
-            high, f_high, f_low = t, f, 0.5 * f_low
-        else:
-            low, f_low, f_high = t, f, 0.5 * f_high
-    d = 1e-3 * (end - begin)
-    slope = (looked(axis, z, whole, t + d) - looked(axis, z, whole, t - d)) / (2.0 * d)
+        t = where_next(b, axis.near, i)
+        b = narrowed(b, t, looked(axis, z, whole, t))
+    t = b.high
     trial = attempt(m, start, t)
+    f, level = over(axis, z, trial)
+    if abs(f) <= axis.near:
+        return trial, True, level
+    d = 1e-3 * (high - low)
+    slope = (looked(axis, z, whole, t + d) - looked(axis, z, whole, t - d)) / (2.0 * d)
     for _ in range(ROOT_STEPS):
-        f = over(axis, z, trial)
-        if abs(f) <= axis.near:
-            return trial, True
-        t = min(max(t - f / slope, 0.0), h) if slope > 0.0 else end
+        t = min(max(t - f / slope, 0.0), h) if slope > 0.0 else high
         trial = attempt(m, start, t)
+        f, level = over(axis, z, trial)
         if slope <= 0.0 or t == 0.0 or t == h:
             break
+        if abs(f) <= axis.near:
+            return trial, True, level
     # The quintic has seen more than there is, or the crossing is another one: go on from there.
-    return trial, over(axis, z, trial) >= 0.0
+    return trial, f >= 0.0, level

@@ -10,19 +10,21 @@ from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
 from stickslip.simulation.exact.flow import Linear, flow, free_motion, linear
+from stickslip.simulation.sampled.bracket import bracket, narrowed, where_next
 from stickslip.simulation.sampled.modes import (
     break_away,
     breaks_at,
     floor_below,
     heaviest,
+    keeps_below,
     sign,
-    stays_below,
 )
 from stickslip.simulation.sampled.rates import spring_of
 from stickslip.simulation.sampled.stretch import Stretch
 
-PHASE = 0.5
-"""rad of the oscillation between two looks at the loads."""
+PHASE = 1.25
+"""rad of the oscillation between two looks at the loads: less than a quarter, so that between them the velocity has one
+extreme at most, and its slope bounds it there."""
 ROOT_STEPS = 60
 EARLY = 1.0 - 1e-12
 """Of the time of a turn, so that rounding does not place it behind."""
@@ -160,17 +162,22 @@ def meeting(axis: Any, swing: Swing, begin: Moment, end: Moment, way: float) -> 
     """
     lin, goal = swing.lin, swing.goal
     here, ahead, d = begin, end, end.time - begin.time
-    load0 = heaviest(axis, goal + here.off, way)
+    load0, level0 = heaviest(axis, goal + here.off, way), 0.0
     while here.time < end.time:
         load1 = heaviest(axis, goal + ahead.off, way)
-        if load1 >= axis.lowest and load1 >= breaks_at(axis, ahead.velocity):
-            return here.time, here.time + d
+        most, level1 = max(load0, load1), 0.0
+        if most >= axis.lowest:
+            level1 = breaks_at(axis, ahead.velocity)
+            if load1 >= level1:
+                return here.time, here.time + d
+            level0 = level0 if level0 > 0.0 else breaks_at(axis, here.velocity)
         piece = Stretch(
             d, ahead.off - here.off, here.velocity, acceleration_at(lin, here), ahead.velocity,
             acceleration_at(lin, ahead),
         )  # fmt: skip
-        if stays_below(axis, max(load0, load1), piece, way) or d <= FINEST * axis.sample_time:
-            here, load0 = Moment(here.time + d, ahead.off, ahead.velocity), load1
+        below = most < axis.lowest or keeps_below(axis, most, piece, way, level0, level1)
+        if below or d <= FINEST * axis.sample_time:
+            here, load0, level0 = Moment(here.time + d, ahead.off, ahead.velocity), load1, level1
             d *= 2.0
         else:
             d *= 0.5
@@ -205,18 +212,11 @@ def turning_time(swing: Swing, low: float, high: float, way: float) -> float:
 
 @kernel(exact=False)
 def bracketed(axis: Any, swing: Swing, low: float, high: float, way: float) -> float:
-    """The time between low and high at which the heaviest load meets the curve (Illinois' rule); not before it."""
-    f_low = min(excess_after(axis, swing, low, way), 0.0)
-    f_high = excess_after(axis, swing, high, way)
+    """The time between low and high at which the heaviest load meets the curve; not before it."""
+    b = bracket(low, high, excess_after(axis, swing, low, way), excess_after(axis, swing, high, way))
     for i in range(ROOT_STEPS):
-        if f_high <= axis.near or high - low <= 1e-14 * axis.sample_time:
+        if b.excess <= axis.near or b.high - b.low <= 1e-14 * axis.sample_time:
             break
-        t = high - f_high * (high - low) / (f_high - f_low)
-        if i > 10 or not low < t < high:
-            t = 0.5 * (low + high)
-        f = excess_after(axis, swing, t, way)
-        if f >= 0.0:
-            high, f_high, f_low = t, f, 0.5 * f_low
-        else:
-            low, f_low, f_high = t, f, 0.5 * f_high
-    return high
+        t = where_next(b, axis.near, i)
+        b = narrowed(b, t, excess_after(axis, swing, t, way))
+    return b.high
