@@ -11,7 +11,7 @@ import math
 from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
-from stickslip.simulation.sampled.bracket import bracket, narrowed, where_next
+from stickslip.simulation.sampled.bracket import Bracket, bracket, narrowed, where_next
 from stickslip.simulation.sampled.modes import break_away, heaviest, keeps_below, sign, turn
 from stickslip.simulation.sampled.order_eight import attempt
 from stickslip.simulation.sampled.rates import (
@@ -308,7 +308,8 @@ def next_break(
             load1, level1 = heaviest(axis, z.moved + moved, way), curve_at(axis, w1)
         most = max(load0, load1)
         if load1 >= level1:
-            return located(axis, z, m, start, whole, t, t + d)
+            b = bracket(t, t + d, load0 - level0, load1 - level1)
+            return located(axis, z, m, start, whole, b)
         piece = Stretch(d, moved - before, w0, b0, w1, b1)
         below = most < axis.lowest or keeps_below(axis, most, piece, way, level0, level1)
         if below or d <= FINEST * axis.sample_time:
@@ -335,14 +336,13 @@ def over(axis: Any, z: Any, trial: Trial) -> tuple[float, float]:
 
 @kernel(exact=False)
 def located(
-    axis: Any, z: Any, m: Slip, start: Start, whole: Stretch, low: float, high: float
+    axis: Any, z: Any, m: Slip, start: Start, whole: Stretch, b: Bracket
 ) -> tuple[Trial, bool, float]:  # fmt: skip
-    """The step between low and high at whose end the heaviest load meets the curve, whether it does, and the curve.
+    """The step within a bracket at whose end the heaviest load meets the curve, whether it does, and the curve.
 
     The place is found on the quintic of the whole step, then corrected on real steps.
     """
-    h = whole.time
-    b = bracket(low, high, looked(axis, z, whole, low), looked(axis, z, whole, high))
+    h, late, d = whole.time, b.high, 1e-3 * (b.high - b.low)
     for i in range(ROOT_STEPS):
         if b.excess <= axis.near or b.high - b.low <= 1e-12 * h:
             break
@@ -353,10 +353,9 @@ def located(
     f, level = over(axis, z, trial)
     if abs(f) <= axis.near:
         return trial, True, level
-    d = 1e-3 * (high - low)
     slope = (looked(axis, z, whole, t + d) - looked(axis, z, whole, t - d)) / (2.0 * d)
     for _ in range(ROOT_STEPS):
-        t = min(max(t - f / slope, 0.0), h) if slope > 0.0 else high
+        t = min(max(t - f / slope, 0.0), h) if slope > 0.0 else late
         trial = attempt(m, start, t)
         f, level = over(axis, z, trial)
         if slope <= 0.0 or t == 0.0 or t == h:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from stickslip.jit import kernel
 from stickslip.simulation.exact.flow import Linear, flow, free_motion, linear
-from stickslip.simulation.sampled.bracket import bracket, narrowed, where_next
+from stickslip.simulation.sampled.bracket import Bracket, bracket, narrowed, where_next
 from stickslip.simulation.sampled.modes import (
     break_away,
     breaks_at,
@@ -140,22 +140,22 @@ def first_break(axis: Any, swing: Swing, left: float) -> tuple[float, float]:
         if v * way < 0.0:
             # The loads peak where the axis turns: look there, from the side it comes from.
             top = after(swing, turning_time(swing, here.time, ahead.time, way))
-            low, high = meeting(axis, swing, here, top, way)
-            if high > 0.0:
-                return bracketed(axis, swing, low, high, way), way
+            b = meeting(axis, swing, here, top, way)
+            if b.high > 0.0:
+                return bracketed(axis, swing, b, way), way
             way, here = -way, top
             if excess(axis, swing.goal + here.off, 0.0, way) >= 0.0:
                 # A bristle that has been bent further.
                 return here.time, way
-        low, high = meeting(axis, swing, here, ahead, way)
-        if high > 0.0:
-            return bracketed(axis, swing, low, high, way), way
+        b = meeting(axis, swing, here, ahead, way)
+        if b.high > 0.0:
+            return bracketed(axis, swing, b, way), way
         here = ahead
     return left, 0.0
 
 
 @kernel(exact=False)
-def meeting(axis: Any, swing: Swing, begin: Moment, end: Moment, way: float) -> tuple[float, float]:
+def meeting(axis: Any, swing: Swing, begin: Moment, end: Moment, way: float) -> Bracket:
     """A piece of the time between begin and end at whose end the heaviest load is above the curve; ends in 0 if none.
 
     Halved until nothing can happen in it: just before the axis turns, the curve may dip under the load and rise again.
@@ -167,10 +167,10 @@ def meeting(axis: Any, swing: Swing, begin: Moment, end: Moment, way: float) -> 
         load1 = heaviest(axis, goal + ahead.off, way)
         most, level1 = max(load0, load1), 0.0
         if most >= axis.lowest:
+            level0 = level0 if level0 > 0.0 else breaks_at(axis, here.velocity)
             level1 = breaks_at(axis, ahead.velocity)
             if load1 >= level1:
-                return here.time, here.time + d
-            level0 = level0 if level0 > 0.0 else breaks_at(axis, here.velocity)
+                return bracket(here.time, here.time + d, load0 - level0, load1 - level1)
         piece = Stretch(
             d, ahead.off - here.off, here.velocity, acceleration_at(lin, here), ahead.velocity,
             acceleration_at(lin, ahead),
@@ -184,7 +184,7 @@ def meeting(axis: Any, swing: Swing, begin: Moment, end: Moment, way: float) -> 
         d = min(d, end.time - here.time)
         if d > 0.0:
             ahead = after(swing, here.time + d)
-    return 0.0, 0.0
+    return bracket(0.0, 0.0, 0.0, 0.0)
 
 
 @kernel(exact=False)
@@ -211,9 +211,8 @@ def turning_time(swing: Swing, low: float, high: float, way: float) -> float:
 
 
 @kernel(exact=False)
-def bracketed(axis: Any, swing: Swing, low: float, high: float, way: float) -> float:
-    """The time between low and high at which the heaviest load meets the curve; not before it."""
-    b = bracket(low, high, excess_after(axis, swing, low, way), excess_after(axis, swing, high, way))
+def bracketed(axis: Any, swing: Swing, b: Bracket, way: float) -> float:
+    """The time within a bracket at which the heaviest load meets the curve; not before it."""
     for i in range(ROOT_STEPS):
         if b.excess <= axis.near or b.high - b.low <= 1e-14 * axis.sample_time:
             break

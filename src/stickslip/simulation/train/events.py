@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 from stickslip.jit import WIDTH, columns_times, kernel, pointer
-from stickslip.simulation.sampled.bracket import bracket, narrowed, where_next
 from stickslip.simulation.sampled.modes import floor_below, heaviest, sign, stays_below
 from stickslip.simulation.sampled.rates import SLIPS, spring_of
 from stickslip.simulation.sampled.stick import excess as above
@@ -131,15 +130,20 @@ def turning_of(train: Train, way: float) -> tuple[float, float]:
 @kernel()
 def root(train: Train, low: float, high: float, way: float) -> float:
     """Where the velocity meets 0 between two parts of a step, from the side on which it still goes `way`."""
-    back = -way
-    begin, end = back * along(train, VELOCITY_POWERS, low), back * along(train, VELOCITY_POWERS, high)
-    b = bracket(low, high, begin, max(end, 0.0))
+    f_low = max(way * along(train, VELOCITY_POWERS, low), 0.0)
+    f_high = min(way * along(train, VELOCITY_POWERS, high), 0.0)
     for i in range(ROOT_STEPS):
-        if b.high - b.low <= 1e-14 or b.excess == 0.0:
+        if high - low <= 1e-14 or f_high == 0.0:
             break
-        middle = where_next(b, 0.0, i)
-        b = narrowed(b, middle, back * along(train, VELOCITY_POWERS, middle))
-    return b.high
+        middle = high - f_high * (high - low) / (f_high - f_low)
+        if i > 12 or not low < middle < high:
+            middle = 0.5 * (low + high)
+        f = way * along(train, VELOCITY_POWERS, middle)
+        if f <= 0.0:
+            high, f_high, f_low = middle, f, 0.5 * f_low
+        else:
+            low, f_low, f_high = middle, f, 0.5 * f_high
+    return high
 
 
 # ---- break-aways ----------------------------------------------------------------------------------------------------
@@ -250,11 +254,18 @@ def met(train: Train, h: float, begin: float, end: float, way: float) -> float:
 
 @kernel()
 def crossing(train: Train, low: float, high: float, way: float) -> float:
-    """The part of a step between low and high from which the heaviest load is above the curve."""
-    b, near = bracket(low, high, excess(train, low, way), excess(train, high, way)), train.axis.near
+    """The part of a step between low and high from which the heaviest load is above the curve (Illinois' rule)."""
+    f_low, f_high = min(excess(train, low, way), 0.0), excess(train, high, way)
+    near = train.axis.near
     for i in range(ROOT_STEPS):
-        if b.excess <= near or b.high - b.low <= 1e-14:
+        if f_high <= near or high - low <= 1e-14:
             break
-        middle = where_next(b, near, i)
-        b = narrowed(b, middle, excess(train, middle, way))
-    return b.high
+        middle = high - f_high * (high - low) / (f_high - f_low)
+        if i > 10 or not low < middle < high:
+            middle = 0.5 * (low + high)
+        f = excess(train, middle, way)
+        if f >= 0.0:
+            high, f_high, f_low = middle, f, 0.5 * f_low
+        else:
+            low, f_low, f_high = middle, f, 0.5 * f_high
+    return high
