@@ -17,7 +17,8 @@ from stickslip.errors import InputError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.report.law_pictures import draw_gallery, draw_law
-from stickslip.simulation.closed_loop import INTEGRATORS, integrator_for, prepare
+from stickslip.simulation.closed_loop import prepare
+from stickslip.simulation.integrators import INTEGRATORS, integrator_for
 from stickslip.spec import Field, Law, fields_of
 
 FOLDER = GENERATED / "laws"
