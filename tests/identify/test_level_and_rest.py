@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip import plugins
 from stickslip.identify.axis.agreed import BAND_ALONE, told_apart
 from stickslip.identify.axis.falling import AT_REST, NO_LEVEL, widened, with_level, with_rest
 from stickslip.identify.axis.identify import identify_axis
@@ -30,10 +29,11 @@ from stickslip.identify.regression.regression import (
 )
 from stickslip.identify.regression.sliding_rows import narrowest_width, signals_of, sliding_rows
 from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
 from stickslip.spec import Par
 
 AXIS = ServoAxis(drive_side="load")
-COULOMB = plugins.law("coulomb")
+COULOMB = Model("coulomb", fc=0.3, sigma2=0.02)
 
 
 def regressed(logs: Any, *cell: Any) -> tuple[Regression, dict[str, float]]:

@@ -25,7 +25,7 @@ from stickslip.identify.axis.falling import (
     with_timing,
     within_sliding,
 )
-from stickslip.identify.axis.form import of_sliding_form
+from stickslip.identify.axis.form import told_with
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.axis.settled import ALONE, APART, TWO_METHODS
 from stickslip.identify.estimate import Estimate
@@ -37,7 +37,7 @@ from stickslip.identify.regression.regression import QUANTILE, Regression, regre
 from stickslip.identify.regression.regressions import Regress
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
-from stickslip.spec import Law
+from stickslip.model import Model
 
 ALIGNED = 0.1
 """Rows by which a torque that acts from row to row must be off its row to be moved."""
@@ -143,11 +143,11 @@ def on_creep(found: Regression | None, axis: ServoAxis) -> list[str]:
 # ---- numbers --------------------------------------------------------------------------------------------------
 
 
-def sliding_values(found: Regression, law: Law | None) -> dict[str, tuple[float, float, float]]:
+def sliding_values(found: Regression, model: Model | None) -> dict[str, tuple[float, float, float]]:
     """Value and ends of the 95 % interval of every number that certain sliding tells, by the names of estimates; none
     of friction where the law means others by these names."""
     own = {n: n for n in ("inertia", "offset", "fc", "sigma2")}
-    if law is not None and not of_sliding_form(law):
+    if not told_with(model, found):
         own = {"inertia": "inertia"} if found.each_way else {n: n for n in ("inertia", "offset")}
     elif found.each_way:
         own = {
@@ -185,8 +185,7 @@ def agreed(
     fine : bool
         Whether the prediction error was asked.
     """
-    law = vector.base.law if vector.base is not None else None
-    sliding, parameters = sliding_values(found, law), {p.name: p for p in vector.free}
+    sliding, parameters = sliding_values(found, vector.base), {p.name: p for p in vector.free}
     held, estimates = known_to_act(found), list(estimates)
     taken, notes, doubts = of_sliding(estimates, found, sliding, parameters, inverse, scale, fine)
     if doubts:
@@ -196,7 +195,7 @@ def agreed(
             for e in estimates if taken.get(e.name) is e
         }  # fmt: skip
         notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
-    for e in estimates if fine and (law is None or of_sliding_form(law)) else ():
+    for e in estimates if fine and told_with(vector.base, found) else ():
         if e.name.removesuffix(NEGATIVE) not in FALL or e.name not in parameters:
             continue
         if found.each_way:
@@ -267,7 +266,7 @@ def of_sliding(
     return taken, notes, doubts
 
 
-def told_apart(estimates: Iterable[Estimate], found: Regression, law: Law) -> tuple[Estimate, ...]:
+def told_apart(estimates: Iterable[Estimate], found: Regression, model: Model) -> tuple[Estimate, ...]:
     """The estimates, inertia, level and slope of friction not identified where certain sliding does not tell them
     apart; values stay.
 
@@ -275,7 +274,7 @@ def told_apart(estimates: Iterable[Estimate], found: Regression, law: Law) -> tu
     or the slope where motor and load move apart; the level is extrapolated, or its value had to be moved far towards
     another method's. A law that means others by these names has its friction from the prediction error.
     """
-    of_law = of_sliding_form(law)
+    of_law = told_with(model, found)
     (low, high), own = found.interval("fc"), found.numbers["fc"].value
     # What sliding hardly tells is the prediction error's.
     clear = {

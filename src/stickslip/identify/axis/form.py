@@ -2,49 +2,92 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from stickslip.binding import NEGATIVE
+from stickslip.friction_levels import static_level
+from stickslip.identify.regression.regression import Regression
+from stickslip.model import Model
+from stickslip.simulation.prescribed.steady import Steady
 from stickslip.spec import Law
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TOLD_BY_SLIDING = (
     "inertia", "offset", "gravity", "gravity_angle", "fc", "sigma2", f"fc{NEGATIVE}", f"sigma2{NEGATIVE}",
 )  # fmt: skip
 """Names under which certain sliding tells numbers of an axis and of its friction's level and slope."""
-FALLS_OVER = (0.3, 30.0)
-"""Times the Stribeck velocity between which the curves are compared; without one between a hundredth and a hundred
-rad/s (m/s)."""
+OTHERWISE = {"fc": 1.3, "fs": 1.6, "vs": 3.0, "sigma2": 2.0}
+"""Factors of a second set of values at which the curves must be the same, so that it is their form that is."""
+SPEEDS = 40
 ALIKE = 1e-3
 """Part of friction's level that the curves may be apart."""
+WIDE = np.geomspace(1e-6, 1e4, 500)
+"""rad/s (m/s), over which a fall is looked for."""
+ROUNDING = 1e-9
+"""Of the largest torque: what a curve may fall by without falling."""
 
 
-def of_sliding_form(law: Law) -> bool:
-    """Whether friction at constant velocity is ``sign(v) (fc + (fs - fc) exp(-|v / vs|^delta_s)) + sigma2 v``.
+def of_sliding_form(model: Model, slowest: float, fastest: float) -> bool:
+    """Whether friction is ``sign(v) (fc + (fs - fc) exp(-|v / vs|^delta_s)) + sigma2 v`` between two speeds.
 
-    Certain sliding fits that curve. A law of one's own whose ``fc`` is the level of another one (a fall as
+    Certain sliding fits that curve there. A law of one's own whose ``fc`` is the level of another one (a fall as
     1 / (1 + (v / vs)^2), a square of the velocity) has its numbers from the prediction error alone, as under any other
     names. A law without ``fc``, or without a curve, is taken at its word.
+
+    Parameters
+    ----------
+    model : Model
+        With values as they may be on this axis: a fall far from the speeds does not count.
+    slowest, fastest : float
+        Of certain sliding, rad/s (m/s).
     """
-    p = law.parameters(dict(law.example))
+    law, p = model.law, model.parameters
     if law.steady is None or not hasattr(p, "fc"):
         return True
-    has_fall = hasattr(p, "vs") and hasattr(p, "fs")
-    scale = float(p.vs) if hasattr(p, "vs") else 1.0
-    low, high = FALLS_OVER if hasattr(p, "vs") else (0.01, 100.0)
-    v = scale * np.geomspace(low, high, 40)
-    level, slope = float(p.fc), float(getattr(p, "sigma2", 0.0))
-    expected = level + slope * v
-    if has_fall:
-        expected += (float(p.fs) - level) * np.exp(-((v / scale) ** float(getattr(p, "delta_s", 2.0))))
-    curve = np.array([float(law.steady(float(x), p)) for x in v])
-    return bool(np.all(np.abs(curve - expected) <= ALIKE * level + 1e-9 * np.abs(expected)))
+    v = np.geomspace(max(slowest, 1e-6 * fastest), fastest, SPEEDS)
+    steady = Steady(law, v, np.ones(v.size))
+    for factors in ({}, OTHERWISE):
+        q = p._replace(**{n: f * getattr(p, n) for n, f in factors.items() if hasattr(p, n)})
+        if not np.all(np.abs(steady.torque(np.array(law.pack(q))) - usual_curve(q, v)) <= ALIKE * abs(q.fc)):
+            return False
+    return True
+
+
+def usual_curve(p: Any, v: Array) -> Array:
+    """The curve of certain sliding with a law's parameters at speeds above 0, shape (n,)."""
+    out = float(p.fc) + float(getattr(p, "sigma2", 0.0)) * v
+    if hasattr(p, "fs") and hasattr(p, "vs"):
+        fall = np.exp(-((v / float(p.vs)) ** float(getattr(p, "delta_s", 2.0))))
+        out = out + (float(p.fs) - float(p.fc)) * fall
+    return out
+
+
+def told_with(model: Model | None, found: Regression) -> bool:
+    """Whether what a regression tells of friction are parameters of this law."""
+    return model is None or of_sliding_form(model, found.slowest, found.fastest)
+
+
+def static_by_name(model: Model) -> bool:
+    """Whether a law's ``fs`` is what the contact withstands at rest, and not, say, the excess over ``fc``."""
+    fs = getattr(model.parameters, "fs", None)
+    if fs is None or model.law.steady is None:
+        return True
+    return abs(static_level(model) - fs) <= 0.05 * abs(fs)
 
 
 def never_falls(law: Law) -> bool:
-    """Whether friction at constant velocity nowhere falls as the velocity rises, by the law's example; one without a
-    curve may."""
-    if law.steady is None:
+    """Whether friction at constant velocity, beside its viscous part, nowhere falls as the velocity rises, by the law's
+    example; one without a curve may."""
+    if law.steady is None or {"fs", "vs"} <= {f.name for f in law.fields}:
         return False
-    p = law.parameters(dict(law.example))
-    v = float(getattr(p, "vs", 0.1)) * np.geomspace(0.01, 1000.0, 200)
-    return bool(np.all(np.diff([float(law.steady(float(x), p)) for x in v]) >= 0.0))
+    curve = Steady(law, WIDE, np.ones(WIDE.size)).torque(
+        np.array(law.pack(law.parameters(dict(law.example))))
+    )
+    if not np.all(np.isfinite(curve)):
+        return False
+    slope = (curve[-1] - curve[-100]) / (WIDE[-1] - WIDE[-100])
+    level = curve - slope * WIDE
+    return bool(np.all(np.diff(level) >= -ROUNDING * np.max(np.abs(curve))))

@@ -25,7 +25,7 @@ from stickslip.identify.axis.agreed import (
 from stickslip.identify.axis.choice import Candidate
 from stickslip.identify.axis.exponent import predicted_with, with_other
 from stickslip.identify.axis.falling import with_level
-from stickslip.identify.axis.form import TOLD_BY_SLIDING
+from stickslip.identify.axis.form import TOLD_BY_SLIDING, static_by_name, told_with
 from stickslip.identify.axis.output import OutputError
 from stickslip.identify.axis.prediction import axis_prediction
 from stickslip.identify.axis.problem import Problem
@@ -90,14 +90,16 @@ def estimated(law: Law, asked: Asked, evidence: Evidence, notes: Sequence[str]) 
     """
     inverse, sliding = evidence.inverse, evidence.sliding
     if sliding is not None and inverse is not None and told_whole(law):
-        found = by_sliding(law, asked, evidence, inverse, sliding, notes)
-        if all(e.identified for e in found.estimates) or not sliding.held_for(HELD):
-            return found
+        model = starting_models(evidence.experiments, law, inverse, asked.values)[0]
+        if told_with(model, sliding):
+            found = by_sliding(model, asked, evidence, inverse, sliding, notes)
+            if all(e.identified for e in found.estimates) or not sliding.held_for(HELD):
+                return found
     return predicted(law, asked, evidence, notes)
 
 
 def by_sliding(
-    law: Law,
+    model: Model,
     asked: Asked,
     evidence: Evidence,
     inverse: InverseDynamics,
@@ -105,8 +107,7 @@ def by_sliding(
     notes: Sequence[str],
 ) -> Identification:
     """An axis whose law certain sliding tells whole: nothing is left for a search."""
-    experiments, axis = evidence.experiments, evidence.axis
-    model = starting_models(experiments, law, inverse, asked.values)[0]
+    experiments, axis, law = evidence.experiments, evidence.axis, model.law
     vector, _ = laid_out(experiments, axis, law, inverse, model, asked)
     scale = vector.signed_scale(sliding.friction)
     start = vector.values(vector.start)
@@ -119,8 +120,8 @@ def by_sliding(
     estimates, said = agreed(first, sliding, vector, inverse, scale, fine=False)
     u = vector.coordinates(vector.named(vector.start) | {e.name: e.value for e in estimates})
     estimates = evident(estimates, vector, u, experiments, axis)
-    estimates, more = beside_plain(estimates, model, inverse, sliding)
-    estimates = told_apart(estimates, sliding, law)
+    estimates, more = beside_plain(estimates, model, vector, inverse, sliding)
+    estimates = told_apart(estimates, sliding, model)
     u = vector.coordinates(vector.named(u) | {e.name: e.value for e in estimates})
     found = with_values(experiments, axis, law, vector, u, asked.extras)
     shown = [replace(e, unit=axis.unit(e.unit)) for e in estimates]
@@ -144,17 +145,29 @@ def by_sliding(
 
 
 def beside_plain(
-    estimates: Sequence[Estimate], model: Model, inverse: InverseDynamics, sliding: Regression
+    estimates: Sequence[Estimate], model: Model, vector: Vector, inverse: InverseDynamics, sliding: Regression
 ) -> tuple[tuple[Estimate, ...], list[str]]:
-    """The estimates settled beside the plain inverse dynamics, as far as certain sliding does not refute it."""
+    """The estimates settled beside the plain inverse dynamics, as far as certain sliding does not refute it.
+
+    They stay as they are where the user holds a part of the axis, or where the law's static torque is not its `fs`:
+    the inverse dynamics has neither.
+    """
+    if holds_a_part(vector) or not static_by_name(model):
+        return tuple(estimates), []
     if any(e.name == f"fc{NEGATIVE}" for e in estimates):
         return settled_each_way(estimates, model, inverse, falls=sliding.shows_a_fall), []
     if as_good(inverse, sliding, ALIKE):
         return settled(estimates, model, inverse)
-    own = {n: (low, high) for n, (_, low, high) in sliding_values(sliding, model.law).items()}
+    own = {n: (low, high) for n, (_, low, high) in sliding_values(sliding, model).items()}
     # Refuted by less than half, it is still in the intervals of the estimates.
     both = {e.name: (e.lower, e.upper) for e in estimates} if as_good(inverse, sliding) else None
     return settled(estimates, model, inverse, own, both, falls=sliding.shows_a_fall)
+
+
+def holds_a_part(vector: Vector) -> bool:
+    """Whether inertia, a constant torque or gravity is held at a value, and not fitted."""
+    held = {p.name: p.value for p in vector.parameters if not p.free}
+    return any(held.get(name, 0.0) != 0.0 for name in ("inertia", "offset", "gravity", "gravity_angle"))
 
 
 def with_values(
@@ -250,7 +263,7 @@ def checked(result: PredictionError | Fitted, evidence: Evidence) -> tuple[tuple
     if sliding is None:
         return estimates, said
     if inverse is not None:
-        estimates, more = beside_plain(estimates, result.model, inverse, sliding)
+        estimates, more = beside_plain(estimates, result.model, result.vector, inverse, sliding)
         said = [*said, *more]
-    estimates = told_apart(estimates, sliding, result.model.law)
+    estimates = told_apart(estimates, sliding, result.model)
     return (estimates if known_to_act(sliding) else with_level(estimates)), said

@@ -5,15 +5,17 @@ As `stickslip.identify.axis.settled`, with a level and a slope for each directio
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from stickslip.binding import NEGATIVE
 from stickslip.identify.axis.gravity import hanging, of_one_weight
-from stickslip.identify.axis.settled import GRAVITY, PREFERRED, Settling, physical, turned
+from stickslip.identify.axis.settled import GRAVITY, PREFERRED, TURNS, Settling, physical, turned
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.bounded import within_bounds
 from stickslip.identify.regression.inverse import InverseDynamics
@@ -53,19 +55,33 @@ class EachWay(Settling):
         return out
 
     def explained(
-        self, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
-    ) -> tuple[dict[str, float], float]:
-        """All values, those with bounds solved for beside the curve's fall as it is, and the RMS torque left, N·m."""
-        torque, names = self.inverse.torque, numbers_in(values)
-        known = sum((values[n] * self.column(n) for n in names if n not in bounds), self.curve(values))
-        out, free = dict(values), list(bounds)
-        columns = np.column_stack([np.zeros((torque.size, 0)), *(self.column(n) for n in free)])
-        if free:
-            low, high = (np.array([bounds[n][k] for n in free]) for k in (0, 1))
-            found = within_bounds(columns, torque - known, low, np.maximum(high, np.nextafter(low, np.inf)))
-            out |= dict(zip(free, found.tolist(), strict=True))
-        left = torque - known - columns @ np.array([out[n] for n in free])
-        return out, float(np.sqrt(np.mean(left**2)))
+        self, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]], flat: Sequence[str],
+        loose: Sequence[str],
+    ) -> tuple[dict[str, float], float]:  # fmt: skip
+        """All values, those with bounds solved for, and the RMS torque left, N·m (N).
+
+        `flat`: names of static torques that are their direction's level; `loose`: those that are not below it.
+        """
+        out, free, names = dict(values), list(bounds), numbers_in(values)
+        columns = np.column_stack([np.zeros((self.inverse.torque.size, 0)), *(self.column(n) for n in free)])
+        low, high = (np.array([bounds[n][k] for n in free]) for k in (0, 1))
+        for _ in range(TURNS):
+            out |= {n: out[level_of(n)] for n in flat}
+            out |= {n: max(out[n], out[level_of(n)]) for n in loose}
+            known = sum((out[n] * self.column(n) for n in names if n not in bounds), self.curve(out))
+            if free:
+                target = self.inverse.torque - known
+                found = within_bounds(columns, target, low, np.maximum(high, np.nextafter(low, np.inf)))
+                out |= dict(zip(free, found.tolist(), strict=True))
+        out |= {n: out[level_of(n)] for n in flat}
+        out |= {n: max(out[n], out[level_of(n)]) for n in loose}
+        told = sum((out[n] * self.column(n) for n in names), self.curve(out))
+        return out, float(np.sqrt(np.mean((self.inverse.torque - told) ** 2)))
+
+
+def level_of(name: str) -> str:
+    """The name of the level that a direction's static torque falls to."""
+    return "fc" + name.removeprefix("fs")
 
 
 def numbers_in(values: Mapping[str, float]) -> list[str]:
@@ -93,18 +109,35 @@ def settled_each_way(
     limits = {n + way: b for n, b in physical(inverse).items() for way in WAYS}
     free = {n: limits[n] for n in needed if not by_name[n].identified}
     free |= turned(by_name, values, inverse)
-    chosen, left = own.explained(values, free)
-    for way in WAYS:
-        rest = by_name.get(f"fs{way}")
-        if falls or rest is None or rest.identified:
-            continue
-        flat, more = own.explained({**chosen, rest.name: chosen[f"fc{way}"]}, free)
-        if not left <= PREFERRED * more:
-            chosen, left = {**flat, rest.name: flat[f"fc{way}"]}, more
+    rests = [e for way in WAYS if (e := by_name.get(f"fs{way}")) is not None]
+    # A level is not above a static torque that is told.
+    for e in (e for e in rests if e.identified and level_of(e.name) in free):
+        free[level_of(e.name)] = (0.0, e.value)
+    loose = [e.name for e in rests if not e.identified]
+    chosen, left = dict(values), math.inf
+    for falling in fewest_first([] if falls else loose):
+        flat = [n for n in loose if not falls and n not in falling]
+        found, rest = own.explained(values, free, flat, [n for n in loose if n not in flat])
+        if left == math.inf or rest <= PREFERRED * left:
+            chosen, left = found, rest
+    if refused(model, chosen):
+        return tuple(estimates)
     if "gravity_sin" in chosen and not by_name["gravity"].identified:
         size, angle = hanging(chosen["gravity_sin"], chosen["gravity_cos"], inverse.position)
         chosen |= {"gravity": size, "gravity_angle": angle}
     return tuple(with_value(e, chosen[e.name]) for e in estimates)
+
+
+def fewest_first(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Every choice among names, the smallest first."""
+    return [some for count in range(len(names) + 1) for some in combinations(names, count)]
+
+
+def refused(model: Model, values: Mapping[str, float]) -> bool:
+    """Whether a law has something against these values together."""
+    own = {f.name for f in model.law.fields}
+    p = model.parameters._replace(**{n: x for n, x in values.items() if n in own})
+    return model.law.check is not None and bool(model.law.check(p))
 
 
 def with_value(e: Estimate, value: float) -> Estimate:

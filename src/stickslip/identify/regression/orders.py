@@ -34,6 +34,14 @@ HELPS = 0.25
 """Of what a harmonic explains where it was fitted, that it must explain where it was not."""
 
 
+def without_waves(torque: Array, rows: Sequence[SlidingRows], orders: Sequence[float]) -> Array:
+    """A torque in the rows of all records less its least-squares waves of these cycles a radian (m), shape (n,)."""
+    if not orders:
+        return torque
+    waves = np.concatenate([np.concatenate([r.around(order) for r in rows]) for order in orders], axis=1)
+    return np.asarray(torque - waves @ np.linalg.lstsq(waves, torque, rcond=None)[0], dtype=np.float64)
+
+
 def candidate_orders(
     records: Sequence[SlidingRows], rotary: bool, period: float | None = None
 ) -> list[float]:

@@ -22,7 +22,7 @@ import numpy as np
 from stickslip.identify.experiment import Experiment, insist_on_motion
 from stickslip.identify.fit.smooth import Window
 from stickslip.identify.regression.band_fit import QUANTILE, BandFit, Number
-from stickslip.identify.regression.band_system import USUAL_EXPONENTS, least_squares
+from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.bands import (
     ROTATED,
     USUALLY,
@@ -36,6 +36,7 @@ from stickslip.identify.regression.bands import (
 )
 from stickslip.identify.regression.creeping import NOWHERE, Creep
 from stickslip.identify.regression.falls import Falling, fall_of
+from stickslip.identify.regression.orders import without_waves
 from stickslip.identify.regression.rebuilding import rebuilt_within
 from stickslip.identify.regression.sliding_rows import (
     Fall,
@@ -179,14 +180,13 @@ class Regression:
         """RMS of `remainder`, N·m (N)."""
         return root_mean_square(self.remainder(values))
 
+    def beside_orders(self, torque: Array) -> Array:
+        """A torque in the rows less what waves over the position, of the orders that were found, explain of it."""
+        return without_waves(torque, self.rows, self.orders)
+
     def unexplained_by(self, values: Mapping[str, float]) -> float:
-        """The same beside what torque over the position, of the orders that were found, explains of it, N·m (N)."""
-        rest = self.remainder(values)
-        if self.orders:
-            waves = [np.concatenate([r.around(order) for r in self.rows]) for order in self.orders]
-            columns = np.concatenate(waves, axis=1)
-            rest = rest - columns @ least_squares(columns, rest)
-        return root_mean_square(rest)
+        """RMS of `remainder` beside that torque over the position, N·m (N)."""
+        return root_mean_square(self.beside_orders(self.remainder(values)))
 
     @property
     def both_forms(self) -> bool:
