@@ -17,8 +17,8 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter
 from stickslip.identify.fit.smooth import Window
-from stickslip.identify.regression.band_fit import Number
 from stickslip.identify.regression.bands import WEIGHT
+from stickslip.identify.regression.number import Number
 from stickslip.identify.regression.rebuilding import rebuilt_within
 from stickslip.identify.regression.regression import (
     AT_ONE_SPEED,

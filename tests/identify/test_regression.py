@@ -17,10 +17,10 @@ from stickslip.identify.axis.plain import inverse_identification
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
-from stickslip.identify.regression.band_fit import Number
 from stickslip.identify.regression.band_system import inverse_of
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identify.regression.number import Number
 from stickslip.identify.regression.orders import Harmonic
 from stickslip.identify.regression.regression import regress_axis, together
 from stickslip.machines.servo import ServoAxis

@@ -11,7 +11,7 @@ import pytest
 from stickslip.identify.axis.agreed import aligned, on_timing
 from stickslip.identify.doctor import examine
 from stickslip.identify.experiment import Experiment
-from stickslip.identify.regression.band_fit import Number
+from stickslip.identify.regression.number import Number
 from stickslip.identify.regression.regression import regress_axis
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record

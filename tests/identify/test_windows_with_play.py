@@ -9,8 +9,8 @@ import pytest
 
 from stickslip.identify.axis.agreed import on_creep
 from stickslip.identify.experiment import Experiment
-from stickslip.identify.regression.band_fit import Number
 from stickslip.identify.regression.creeping import NOWHERE
+from stickslip.identify.regression.number import Number
 from stickslip.identify.regression.regression import (
     STILL_ROUGH,
     UNSURE_THERE,

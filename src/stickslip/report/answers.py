@@ -20,6 +20,7 @@ from stickslip.identify.axis.problem import mechanics_parameters
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.identify.motion import speeds_of
+from stickslip.identify.regression.drifting import DRIFTS_BY, drift_of
 from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
@@ -216,6 +217,13 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
     if any(OTHER_LOOP in note for note in found.notes):
         out.append("the record shows another controller than the loop given")
     warned = [f for f in found.findings if getattr(f, "level", "") == "warning"]
+    regression = found.details.get("regression")
+    if isinstance(regression, Regression) and not any(f.code == "change" for f in warned):
+        drift = drift_of(regression.numbers, regression.rows)
+        if drift is not None and abs(drift.share) >= DRIFTS_BY:
+            out.append(
+                f"friction {drift} over the record: warm the axis up first, or cut with --from and --to"
+            )
     if warned:
         out.append(f"the doctor warns of the record{'s' if len(warned) > 1 else ''} ({codes(warned)})")
     return out

@@ -13,6 +13,7 @@ import numpy as np
 from stickslip.identify.estimate import Identification
 from stickslip.identify.fit.smooth import seen
 from stickslip.identify.monte_carlo import sliding_torque
+from stickslip.identify.regression.drifting import drift_torque
 from stickslip.identify.regression.force_error import model_torque
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
@@ -39,7 +40,7 @@ class Sliding:
     time, velocity, position : array, shape (n,)
         s, rad/s (m/s), rad (m).
     measured, model : array, shape (n,)
-        The torque that acted and that of the model, N·m (N).
+        The torque that acted, less what friction's drift adds to it, and that of the model, N·m (N).
     inertial : array, shape (n,)
         What of the model's accelerates and lifts: all but friction and the constant torque, N·m (N).
     record : array of int, shape (n,)
@@ -92,7 +93,9 @@ def sliding_of(found: Identification) -> Sliding | None:
         return None
     rows = regression.rows
     skew = regression.numbers["skew"].value
-    parts = [part(r, skew, mechanics) for r in rows]
+    added = drift_torque(regression.numbers, rows)
+    drifts = np.split(added, np.cumsum([r.time.size for r in rows])[:-1])
+    parts = [part(r, d, skew, mechanics) for r, d in zip(rows, drifts, strict=True)]
     columns = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
     velocity = columns["velocity"]
     record = np.repeat(np.arange(len(parts)), [p["time"].size for p in parts])
@@ -114,8 +117,8 @@ def left_by_plain(regression: Regression, inverse: Any) -> float:
     return regression.left_by(inverse.numbers())
 
 
-def part(rows: SlidingRows, skew: float, mechanics: Mechanics) -> dict[str, Array]:
-    """What one record says, by the names of `Sliding`."""
+def part(rows: SlidingRows, drift: Array, skew: float, mechanics: Mechanics) -> dict[str, Array]:
+    """What one record says, by the names of `Sliding`, without what friction's drift adds to its torque, N·m (N)."""
     step = max(1, math.ceil(rows.time.size / POINTS))
     some = slice(None, None, step)
     inertial = mechanics.inertia * rows.fixed[some, ACCELERATION]
@@ -123,7 +126,7 @@ def part(rows: SlidingRows, skew: float, mechanics: Mechanics) -> dict[str, Arra
         inertial = inertial + mechanics.gravity * np.sin(rows.position[some] - mechanics.gravity_angle)
     return {
         "time": rows.time[some], "velocity": rows.speed[some], "position": rows.position[some],
-        "measured": rows.torque(skew)[some], "inertial": inertial,
+        "measured": (rows.torque(skew) - drift)[some], "inertial": inertial,
     }  # fmt: skip
 
 

@@ -248,7 +248,8 @@ def of_sliding(
         apart = abs(e.value - own.value) > math.hypot(e.upper - e.lower, own.upper - own.lower) / 2.0
         if fine and not apart:
             # Its intervals are narrow, and hold where the torque acted as simulations take it.
-            taken[e.name] = e if held and e.identified and not own.identified else own
+            better = held and e.identified and not own.identified and not found.drifts
+            taken[e.name] = e if better else own
             continue
         if (
             fine

@@ -10,7 +10,7 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parameter_vector import Parameter
 from stickslip.identify.fit.uncertainty import verdict_on
-from stickslip.identify.regression.band_fit import QUANTILE, Number
+from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.regression import FALLS, Regression
 
 FALL = ("fs", "vs")

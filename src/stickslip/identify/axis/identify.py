@@ -24,6 +24,7 @@ from stickslip.identify.axis.agreed import (
     regressed,
 )
 from stickslip.identify.axis.choice import Candidate, asked_of, chosen_of, compared, foreseen, sentence_on
+from stickslip.identify.axis.drifting import at_the_middle, on_drift
 from stickslip.identify.axis.exponent import is_open, shown
 from stickslip.identify.axis.form import TOLD_BY_SLIDING, never_falls
 from stickslip.identify.axis.law_fit import Evidence, against_sliding, estimated
@@ -253,13 +254,15 @@ def looked_at(
     # A turn is what the regression takes where no period is given: so the doctor has asked before.
     period = None if extras.harmonic_period == Extras().harmonic_period else extras.harmonic_period
     sliding, notes = regressed(experiments, axis, skew, period, regress, per_direction)
-    experiments, validation = aligned(experiments, sliding), aligned(validation, sliding)
+    experiments = at_the_middle(aligned(experiments, sliding), axis, sliding)
+    validation = aligned(validation, sliding)
     inverse, more = first_look(experiments, axis, extras, per_direction)
     unchecked = sliding is None and all(t.drive is not None for t in experiments)
     said = [
         *(on_timing(sliding) if skew is None else []),
         *on_width(sliding),
         *on_creep(sliding, axis),
+        *on_drift(sliding),
         *notes,
         *more,
     ]

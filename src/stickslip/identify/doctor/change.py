@@ -19,6 +19,7 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import Array, Mask, Smooth, View, row
 from stickslip.identify.fit.profile import long_run
+from stickslip.identify.regression.drifting import DRIFTS_BY, drift_of
 
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 
@@ -76,7 +77,24 @@ class Change:
 
 
 def changes(view: View) -> Iterator[Finding]:
-    """Friction, inertia or load of another size in one part of the record than in the other."""
+    """Friction, inertia or load of another size in one part of the record than in the other; or a drift."""
+    found = list(_between_blocks(view))
+    yield from found or _drifting(view)
+
+
+def _drifting(view: View) -> Iterator[Finding]:
+    """Friction that drifts evenly with time, as certain sliding shows it, by more than a few percent."""
+    found = view.sliding
+    drift = None if found is None else drift_of(found.numbers, found.rows)
+    if drift is None or abs(drift.share) < DRIFTS_BY:
+        return
+    message = f"friction {drift} over the record: what is identified is that of its middle"
+    remedy = "let the machine warm up before, or identify parts alone, with --from and --to"
+    yield Finding("warning", "change", message, remedy=remedy)
+
+
+def _between_blocks(view: View) -> Iterator[Finding]:
+    """What is of another size in some blocks than in the others."""
     smooth = view.smooth
     if smooth is None or view.torque_channel != "motor_torque" or smooth.fast <= 0.0:
         return

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.band_system import (
     COULOMB,
     INERTIA,
@@ -27,6 +26,8 @@ from stickslip.identify.regression.band_system import (
     Candidate,
     System,
 )
+from stickslip.identify.regression.drifting import drift_rows
+from stickslip.identify.regression.number import Number
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import memory_of
 
@@ -37,7 +38,6 @@ EACH_WAY = ("fc_positive", "fc_negative", "sigma2_positive", "sigma2_negative")
 ROUNDS = 12
 SETTLED = 1e-6  # s: the skew's change at which its search ends
 FARTHEST, STRIDE = 40.0, 4.0  # times the skew's usual size: as far as it is looked for, and in a step
-QUANTILE = 1.96  # standard deviations on either side of 95 %
 SHOWN = 0.03  # of Fc: a fall of friction that is one
 FORM = 0.003  # of Fc: misfit that is assumed at least
 TENSION, FAR = (
@@ -46,25 +46,6 @@ TENSION, FAR = (
 )  # standard deviations: viscous friction below 0 at most; above 0, where the bound does nothing
 MEMORY = 3.0  # rows over which it is correlated at least
 MOVES = 0.35  # of a torque over the position, by which it moves what accelerates where its orders are not told apart
-
-
-@dataclass(frozen=True, slots=True)
-class Number:
-    """A value and its standard deviation."""
-
-    value: float
-    std: float
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Of 95 %."""
-        return self.value - QUANTILE * self.std, self.value + QUANTILE * self.std
-
-    @property
-    def told_to_two(self) -> bool:
-        """Whether its interval spans a factor of two at most."""
-        low, high = self.interval
-        return 0.0 < high <= RATIO * low
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +59,8 @@ class BandFit:
     numbers : dict of str to Number
         ``inertia``, ``sigma2``, ``fc``, ``offset``, ``skew`` (s by which the torque's column lies behind), ``fs`` (the
         curve's end at rest), ``gravity_sin``, ``gravity_cos``; of friction each way ``uneven`` (half of what sigma2 is
-        greater by for v > 0) and the levels and slopes of `EACH_WAY`.
+        greater by for v > 0) and the levels and slopes of `EACH_WAY`; where friction may drift, those of
+        `stickslip.identify.regression.drifting.DRIFTS`.
     falls : float
         Probability that friction falls by more than `SHOWN` of Fc.
     probability : array, shape (m,)
@@ -88,7 +70,8 @@ class BandFit:
     harmonics : array, shape (k, 2)
         Cosine and sine of every order taken in, N·m (N).
     correlation : array, shape (p, p)
-        Of inertia, sigma2, fc, offset, gravity's two and those of `EACH_WAY`, in the most probable candidate.
+        Of inertia, sigma2, fc, offset, gravity's two, those of `EACH_WAY` and a drift's, in the most probable
+        candidate.
     misfit : float
         RMS of what is left, N·m (N).
     relative : float
@@ -112,7 +95,7 @@ class BandFit:
 def fit_band(
     records: Sequence[SlidingRows], tried: Sequence[Fall], *, orders: Sequence[float] = (),
     background: Sequence[float] = (), pendulum: bool = False, skew_size: float = 3e-3, skew: float | None = None,
-    start: float = 0.0, blurred: bool = False, each_way: bool = False,
+    start: float = 0.0, blurred: bool = False, each_way: bool = False, drifting: bool = False,
 ) -> BandFit:  # fmt: skip
     """Fit the rows of certain sliding that one window shows.
 
@@ -136,8 +119,10 @@ def fit_band(
         Whether the way is too short to tell orders apart: what is near those found is then not small.
     each_way : bool
         Whether friction has a level and a slope of its own in each direction.
+    drifting : bool
+        Whether level and slope of friction may change evenly with time.
     """
-    system = System(records, tried, orders, background, pendulum, skew_size, each_way)
+    system = System(records, tried, orders, background, pendulum, skew_size, each_way, drifting)
     at = start if skew is None else skew
     system.expected = at
     torque = system.torque(at)
@@ -167,6 +152,8 @@ def fit_band(
         torque = system.torque(at)
         candidates = system.candidates(torque, at)
     named = combinations(system.core, pendulum, each_way)
+    if drifting:
+        named |= drift_rows(records, system.core, CORE + 2 * pendulum + each_way)
     out = summed_up(system, torque, candidates, weight, at, tried, len(orders), named)
     if not (blurred and orders):
         return out

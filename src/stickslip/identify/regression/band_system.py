@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.regression.drifting import MAY_DRIFT, drift_columns, drift_unseen
 from stickslip.identify.regression.rounding import rounded_sums
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
@@ -124,7 +125,7 @@ def refuted_above(freedom: int) -> float:
 
 
 def small_columns(
-    records: Sequence[SlidingRows], fc: float, orders: Sequence[float], each_way: bool
+    records: Sequence[SlidingRows], fc: float, orders: Sequence[float], each_way: bool, drifting: bool = False
 ) -> tuple[Array, Array]:
     """Columns of what no law holds, shape (n, k), and the standard deviation of each coefficient."""
     v, gone = stacked(records, "speed"), stacked(records, "gone")
@@ -151,6 +152,8 @@ def small_columns(
         # A fall that is not the same in both directions: the constant torque is half the difference of the levels.
         columns.append(slowly)
         std += [LAGGING, LAGGING, EACH_FALL if each_way else UNEVEN_FALL]
+    columns.append(drift_unseen(records, drifting))
+    std.append(MAY_DRIFT)
     for order in orders:
         columns += list(np.concatenate([r.around(order) for r in records]).T)
         std += [AROUND] * 2
@@ -169,7 +172,7 @@ class System:
 
     def __init__(
         self, records: Sequence[SlidingRows], falls: Sequence[Fall], orders: Sequence[float], background:
-        Sequence[float], pendulum: bool, skew_size: float, each_way: bool = False,
+        Sequence[float], pendulum: bool, skew_size: float, each_way: bool = False, drifting: bool = False,
     ):  # fmt: skip
         self.records, self.skew_size, self.expected = records, skew_size, 0.0
         self.stroke = strokes_of(records)
@@ -180,6 +183,8 @@ class System:
             core.append(np.column_stack([np.sin(angle), np.cos(angle)]))
         if each_way:
             core.append(np.abs(stacked(records, "speed"))[:, None])
+        if drifting:
+            core.append(drift_columns(records))
         core += [np.concatenate([r.around(o) for r in records]) for o in orders]
         plain = np.column_stack(core)
         self.core = plain.shape[1]
@@ -202,7 +207,7 @@ class System:
         beyond = np.maximum(speed / max(USUAL * often, 1e-300), 1.0)
         before = beyond**-2.0 * np.array([USUAL_EXPONENTS[falls[k].exponent] for k in self.levels])
         self.before = before / max(float(np.sum(before)), 1e-300)
-        small, self.std = small_columns(records, self.fc, background, each_way)
+        small, self.std = small_columns(records, self.fc, background, each_way, drifting)
         columns = np.column_stack([plain, falling[:, self.levels], small])
         scale = np.linalg.norm(columns, axis=0)
         # A wave that the window damps away is 0: the square of what is left of it would be.

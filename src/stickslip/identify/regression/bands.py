@@ -16,9 +16,11 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.fit.shifts import Whole, least_between, shifts_looked_at
 from stickslip.identify.fit.smooth import Window, seen
-from stickslip.identify.regression.band_fit import QUANTILE, BandFit, Number, fit_band
+from stickslip.identify.regression.band_fit import BandFit, fit_band
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.creeping import NOWHERE, Creep, creep_of
+from stickslip.identify.regression.drifting import DRIFTS
+from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.orders import candidate_orders, goes_round, shown_orders
 from stickslip.identify.regression.rebuilding import rebuilding_way
 from stickslip.identify.regression.sliding_rows import FEWEST, Fall, Signals, SlidingRows, sliding_rows
@@ -57,6 +59,11 @@ BACKGROUND = 12
 TELLING, NARROW = 4.0, 0.1
 """A band tells of a number where its standard deviation is at most so many times the smallest, or that part of the
 value."""
+FINEST = 0.01
+"""Rows: standard deviation of a skew that is found, at least: a hold, a lag and a mean are a delay to that only."""
+FORM = 0.012
+"""Part of Fc, one standard deviation, that its level is unsure by where the slope beside it is not told: of 103 levels
+on tuning steps 89 % held without it."""
 WEIGHT = (0.5 / math.pi,)
 """Cycles a radian of a pendulum's weight."""
 ROTATED = {"gravity_sin", "gravity_cos"}
@@ -78,6 +85,8 @@ class Bands:
         Times that the windows are wider than noise asks.
     creep : Creep
         Up to which speed friction is missing in the widest, so that slower rows are left out.
+    perhaps : tuple of BandFit
+        The fits beside a drift of friction that may be there, but is not told.
     """
 
     fits: tuple[BandFit, ...]
@@ -85,6 +94,12 @@ class Bands:
     orders: tuple[float, ...]
     widened: float = 1.0
     creep: Creep = NOWHERE
+    perhaps: tuple[BandFit, ...] = ()
+
+    @property
+    def drifts(self) -> bool:
+        """Whether friction is taken to drift over the record."""
+        return "drift" in self.fits[0].numbers
 
     @property
     def exponents(self) -> Sequence[float]:
@@ -235,7 +250,7 @@ def orders_in(
     own = WEIGHT if axis.gravity == "pendulum" else ()
     candidates = candidates[len(own) :]  # the first is a pendulum's own
     curve = [k for k, fall in enumerate(falls) if fall.exponent in GAUSSIAN][::CURVE]
-    shown = shown_orders(rows, skew, candidates, curve, own)
+    shown = shown_orders(rows, skew, candidates, curve, own, options.get("drifting", False))
     return {
         "orders": shown, "background": [o for o in candidates[:BACKGROUND] if o not in shown],
         "blurred": not goes_round(rows, axis.motion == "rotary", period),
@@ -309,7 +324,7 @@ def rows_of(
 def that_tell(name: str, bands: Sequence[BandFit]) -> list[BandFit]:
     """The fits that tell of a number."""
     least = min(b.numbers[name].std for b in bands)
-    signed = name in ROTATED or name in ("skew", "offset", "uneven")
+    signed = name in ROTATED or name in ("skew", "offset", "uneven", *DRIFTS)
 
     def tells(n: Number) -> bool:
         return n.std <= max(TELLING * least, 0.0 if signed else NARROW * abs(n.value))
@@ -338,3 +353,21 @@ def mixed(numbers: Sequence[Number]) -> Number:
     value = math.fsum(n.value for n in numbers) / len(numbers)
     variance = math.fsum(n.std**2 + (n.value - value) ** 2 for n in numbers) / len(numbers)
     return Number(value, math.sqrt(variance))
+
+
+def holding(found: Number, perhaps: Number) -> Number:
+    """A number whose interval holds what it may be as well."""
+    return Number(found.value, max(found.std, abs(perhaps.value - found.value) / QUANTILE))
+
+
+def as_told(numbers: Mapping[str, Number], size: float, period: float) -> Number:
+    """The skew, s: no surer than its usual size where the inertia, by which acceleration shows it, is not told."""
+    found, untold = numbers["skew"], not numbers["inertia"].told_to_two
+    return Number(found.value, math.hypot(found.std, FINEST * period, size if untold else 0.0))
+
+
+def with_form(level: Number, slope: Number) -> Number:
+    """The level of friction, where the slope beside it is not told no surer than a law's form is true."""
+    if slope.told_to_two:
+        return level
+    return Number(level.value, math.hypot(level.std, FORM * level.value))

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from stickslip.identify.regression.band_fit import BandFit, Number
+from stickslip.identify.regression.band_fit import BandFit
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
+from stickslip.identify.regression.number import Number
 
 Falling = Mapping[float, tuple[float, Number]]
 """By exponent of a fall of friction: how probable it is if there is one, and its velocity, rad/s (m/s)."""

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.identify.regression.drifting import drift_columns
 from stickslip.identify.regression.sliding_rows import SlidingRows
 from stickslip.identify.regression.strokes import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
 
@@ -73,7 +74,7 @@ def way_of(records: Sequence[SlidingRows]) -> float:
 
 def shown_orders(
     records: Sequence[SlidingRows], skew: float, candidates: Sequence[float], falls: Sequence[int],
-    known: Sequence[float] = (),
+    known: Sequence[float] = (), drifting: bool = False,
 ) -> list[float]:  # fmt: skip
     """Those of the candidates that the records show, the largest first.
 
@@ -89,11 +90,13 @@ def shown_orders(
         chance, and an order then stands out of it that is not there.
     known : sequence of float
         Cycles a radian (m) that are there in any case: a pendulum's weight, which over half a turn two others make up.
+    drifting : bool
+        Whether level and slope of friction may change evenly with time.
     """
     torque = np.concatenate([r.torque(skew) for r in records])
     columns = np.column_stack([
         stacked(records, "fixed"), stacked(records, "jerk"), stacked(records, "falling")[:, list(falls)],
-        *(around(records, order) for order in known),
+        *(around(records, order) for order in known), *([drift_columns(records)] if drifting else []),
     ])  # fmt: skip
     size = np.linalg.norm(columns, axis=0)
     columns = columns[:, size > 0.0] / size[size > 0.0]

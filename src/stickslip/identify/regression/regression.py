@@ -21,21 +21,26 @@ import numpy as np
 
 from stickslip.identify.experiment import Experiment, insist_on_motion
 from stickslip.identify.fit.smooth import Window
-from stickslip.identify.regression.band_fit import QUANTILE, BandFit, Number
+from stickslip.identify.regression.band_fit import EACH_WAY, BandFit
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.bands import (
     ROTATED,
     USUALLY,
     WEIGHT,
-    calmed,
+    as_told,
     decided,
+    holding,
     in_bands,
     rough,
     that_tell,
     together,
+    with_form,
 )
 from stickslip.identify.regression.creeping import NOWHERE, Creep
+from stickslip.identify.regression.drifted import calm_beside_drift
+from stickslip.identify.regression.drifting import DRIFTS, drift_torque
 from stickslip.identify.regression.falls import Falling, fall_of
+from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.orders import without_waves
 from stickslip.identify.regression.rebuilding import rebuilt_within
 from stickslip.identify.regression.sliding_rows import (
@@ -54,8 +59,6 @@ SKEW_ROWS, SKEW_TIME = 1.0, 1e-3
 """Rows, or s if longer, by which a torque column usually lies off at most (one standard deviation)."""
 UNSURE = 0.3
 """Part of Fc to which the torque that accelerates must be known for friction to be believed."""
-FINEST = 0.01
-"""Rows: standard deviation of a skew that is found, at least: a hold, a lag and a mean are a delay to that only."""
 GIVEN = 0.05
 """Rows to which a skew that is given is known."""
 LEVEL, EXCLUDED = 0.05, 0.05
@@ -66,9 +69,6 @@ which the slowest rows lie where one may hide; and of the rows that must be fast
 STRAIGHT = 0.15
 """The same two parts of Fc where no fall is there: level and slope are then one straight line's. Of 16 such levels of
 another program's 200 logs, 5 to 15 % unsure, all held, wrong by 4 % at most."""
-FORM = 0.012
-"""Part of Fc, one standard deviation, that its level is unsure by where the slope beside it is not told: of 103 levels
-on tuning steps 89 % held without it."""
 FALLS, SHOWN = 0.95, 4.0
 """Probability, and standard deviations of Fs - Fc, from which on friction is taken to fall with velocity."""
 LEVEL_UNTOLD = (
@@ -117,7 +117,8 @@ class Regression:
     numbers : dict of str to Number
         ``inertia``, ``sigma2``, ``fc``, ``offset``, ``fs`` (the curve's end at rest), ``skew`` (s by which the
         column of the torque lies behind the torque that acted; negative: ahead), and of a pendulum ``gravity_sin``,
-        ``gravity_cos``.
+        ``gravity_cos``. Where friction drifts also `stickslip.identify.regression.drifting.DRIFTS`, and the others are
+        those of the middle of the record.
     bands : tuple of BandFit
         From the widest band of frequencies to the narrowest.
     orders : tuple of float
@@ -141,6 +142,8 @@ class Regression:
     each_way : bool
         Whether friction has a level and a slope of its own in each direction: ``fc_positive`` and so on are numbers
         too, ``fc``, ``sigma2`` and ``fs`` the means of both.
+    perhaps : tuple of BandFit
+        The fits beside a drift of friction that may be there, but is not told.
     """
 
     numbers: dict[str, Number]
@@ -156,6 +159,7 @@ class Regression:
     creep: Creep = NOWHERE
     each_way: bool = False
     rebuilt: float = math.inf
+    perhaps: tuple[BandFit, ...] = ()
 
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval of a number."""
@@ -171,6 +175,7 @@ class Regression:
         known = known + values.get("gravity_cos", 0.0) * np.cos(position)
         speed = stacked(self.rows, "speed")
         known = known + values.get("uneven", 0.0) * np.abs(speed)
+        known = known + drift_torque(self.numbers, self.rows)
         if {"fs", "vs"} <= values.keys():
             left = Fall(values["vs"], self.exponent).at(speed)
             known = known + (values["fs"] - values["fc"]) * left * np.sign(speed)
@@ -187,6 +192,11 @@ class Regression:
     def unexplained_by(self, values: Mapping[str, float]) -> float:
         """RMS of `remainder` beside that torque over the position, N·m (N)."""
         return root_mean_square(self.beside_orders(self.remainder(values)))
+
+    @property
+    def drifts(self) -> bool:
+        """Whether friction is taken to drift over the record."""
+        return "drift" in self.numbers
 
     @property
     def both_forms(self) -> bool:
@@ -212,7 +222,7 @@ class Regression:
     @property
     def correlated(self) -> list[str]:
         """The numbers whose correlation the bands hold, in its order, by the names of estimates."""
-        names = [n for n in self.bands[0].numbers if n not in ("skew", "fs")]
+        names = [n for n in self.bands[0].numbers if n not in ("skew", "fs", *DRIFTS)]
         if not self.each_way:
             return names
         return [f"mean of {n}" if n in ("fc", "sigma2") else n.removesuffix("_positive") for n in names]
@@ -362,15 +372,17 @@ def regress_axis(
         "pendulum": axis.gravity == "pendulum", "skew_size": size, "skew": skew, "each_way": each_way,
     }  # fmt: skip
     ask = (axis, options, harmonics, harmonic_period)
-    seen = calmed(in_bands(signals, width, *ask), signals, width, *ask)
+    seen = calm_beside_drift(signals, width, *ask)
     if skew is None and abs(seen.fits[0].numbers["skew"].value) > USUALLY * size:
-        ask = (axis, {**options, "skew": 0.0}, harmonics, harmonic_period)
+        ask = (axis, {**options, "skew": 0.0, "drifting": seen.drifts}, harmonics, harmonic_period)
         none = in_bands(signals, seen.widened * width, *ask, exponents=seen.exponents)
         seen = decided(seen, replace(none, widened=seen.widened))
     bands = seen.fits
     speed = np.abs(stacked(seen.rows, "speed"))
     falls, falling = fall_of(bands)
     numbers = {name: together(name, bands) for name in bands[0].numbers}
+    for name in numbers.keys() & {"offset", "fc", "sigma2", *EACH_WAY} if seen.perhaps else ():
+        numbers[name] = holding(numbers[name], together(name, seen.perhaps))
     for way in ("", "_positive", "_negative") if each_way else ("",):
         numbers[f"fc{way}"] = with_form(numbers[f"fc{way}"], numbers[f"sigma2{way}"])
     numbers["skew"] = Number(skew, size) if skew is not None else as_told(numbers, size, period)
@@ -379,20 +391,8 @@ def regress_axis(
     return Regression(
         numbers, bands, seen.orders, falls, falling, float(np.quantile(speed, 0.01)), float(np.max(speed)), period,
         seen.rows, seen.widened, seen.creep, each_way, rebuilt_within(whole, numbers["skew"].value, weight),
+        seen.perhaps,
     )  # fmt: skip
-
-
-def as_told(numbers: Mapping[str, Number], size: float, period: float) -> Number:
-    """The skew, s: no surer than its usual size where the inertia, by which acceleration shows it, is not told."""
-    found, untold = numbers["skew"], not numbers["inertia"].told_to_two
-    return Number(found.value, math.hypot(found.std, FINEST * period, size if untold else 0.0))
-
-
-def with_form(level: Number, slope: Number) -> Number:
-    """The level of friction, where the slope beside it is not told no surer than a law's form is true."""
-    if slope.told_to_two:
-        return level
-    return Number(level.value, math.hypot(level.std, FORM * level.value))
 
 
 def root_mean_square(x: Array) -> float:

@@ -87,6 +87,11 @@ class Signals:
         """From row to row, s."""
         return float((self.time[-1] - self.time[0]) / (self.time.size - 1))
 
+    @property
+    def middle(self) -> float:
+        """Half way from the first row to the last, s."""
+        return 0.5 * float(self.time[0] + self.time[-1])
+
 
 def signals_of(experiment: Experiment, axis: ServoAxis) -> Signals:
     """The experiment on a regular grid."""
@@ -238,12 +243,11 @@ def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
     """
     q, period = signals.position, signals.period
     v, a, jerk = seen(q, window.weights(1), window.weights(2), window.weights(3))
-    fine = Window(max(NARROWEST * period, window.width / FINER), period)
+    fine = fine_window(window)
     (quick,) = seen(q, fine.weights(1))
-    certain = max(CERTAIN * signals.noise * fine.noise(1), CREEPING * float(np.sqrt(np.mean(quick**2))))
     direction = np.sign(quick)
     turned = np.concatenate([[False], direction[1:] != direction[:-1]])
-    doubtful = turned | (np.abs(quick) < certain) | ~signals.rows
+    doubtful = turned | (direction_in(signals, fine, quick) == 0.0) | ~signals.rows
     clear = ~within(doubtful, window.reach)
     clear[: window.reach] = clear[q.size - window.reach :] = False
     stride = stride_of(window)
@@ -262,6 +266,18 @@ def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
         np.column_stack([a[places], v[places], sign, np.ones(places.size)]), jerk[places],
         np.zeros((places.size, 0)), stroke, signals, window, places, np.abs(q[places] - q[stopped[places]]), quick,
     )  # fmt: skip
+
+
+def fine_window(window: Window) -> Window:
+    """The narrower window that tells whether the axis moves."""
+    return Window(max(NARROWEST * window.period, window.width / FINER), window.period)
+
+
+def direction_in(signals: Signals, fine: Window, quick: Array) -> Array:
+    """Direction of motion at every row of the signals, 0 where it is not certain; `quick` is the velocity that such a
+    narrower window shows, rad/s (m/s)."""
+    certain = max(CERTAIN * signals.noise * fine.noise(1), CREEPING * float(np.sqrt(np.mean(quick**2))))
+    return np.asarray(np.where(np.abs(quick) < certain, 0.0, np.sign(quick)), dtype=np.float64)
 
 
 def within(marked: np.ndarray[Any, np.dtype[np.bool_]], reach: int) -> np.ndarray[Any, np.dtype[np.bool_]]:
