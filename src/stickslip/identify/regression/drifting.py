@@ -97,7 +97,7 @@ class Drift(NamedTuple):
 
     def __str__(self) -> str:
         way = "falls" if self.share < 0.0 else "rises"
-        return f"{way} by {100.0 * abs(self.share):.2g} % (±{100.0 * self.half:.1g})"
+        return f"{way} by {100.0 * abs(self.share):.2g} % (±{100.0 * self.half:.2g})"
 
 
 def drift_of(numbers: Mapping[str, Number], records: Sequence[SlidingRows]) -> Drift | None:
