@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.analyse.controller_loop import linearised
+from stickslip.analyse.controller_loop import linear_to, linearised
 from stickslip.analyse.controller_margins import controller_stability
 from stickslip.analyse.machine_axis import axis_of
 from stickslip.analyse.presliding_loop import Drive, Loop, describing
@@ -148,6 +148,82 @@ def test_what_is_not_smooth_about_rest_is_refused():
     sharp = ControlBlock(smooth.law, **{**smooth.parameters._asdict(), "layer": 1e-9})
     with pytest.raises(InputError, match="sliding_mode is not smooth about rest"):
         linearised(Controller(loop=sharp, sample_time=T), 1e-6, 100.0)
+
+
+# ---- up to which motion it is linear --------------------------------------------------------------------------------
+
+BENT = """from typing import Annotated, NamedTuple
+import math
+from stickslip.control_spec import ControlLaw
+from stickslip.spec import Par
+
+
+class Params(NamedTuple):
+    width: Annotated[float, Par("rad", "w", "width", positive=True)]
+
+
+def sample(y, z, p, u):
+    return {}
+
+
+CONTROL_LAW = ControlLaw("bent", Params, sample, "loop", title="t", equation="T", source=(), example={{"width": 1e-4}})
+"""
+DEAD = "5.0 * (max(y.error - p.width, 0.0) + min(y.error + p.width, 0.0))"
+
+
+@pytest.fixture
+def bent(tmp_path):
+    """A controller whose torque has this text."""
+
+    def made(text: str, width: float) -> Controller:
+        file = tmp_path / "bent.py"
+        file.write_text(BENT.format(text))
+        return Controller(loop=ControlBlock(str(file), width=width), sample_time=T)
+
+    return made
+
+
+def test_a_smooth_law_is_linear_up_to_where_it_bends(bent):
+    controller = bent("5.0 * p.width * math.tanh(y.error / p.width)", 1e-7)
+    assert linear_to(controller, 5e-8, 20.0) == 5e-8
+    assert 3e-8 < linear_to(controller, 1e-4, 20.0) < 1e-7
+
+
+def test_stability_says_up_to_which_motion_it_holds(bent):
+    """It spoke about any amplitude with the slope of a motion a thousand times smaller."""
+    controller = bent("5.0 * y.error - 0.05 * p.width * math.tanh(y.velocity / p.width)", 0.01)
+    said = {}
+    for amplitude in (1e-7, 1e-3):
+        found = controller_stability(axis_of(DRY, amplitude), controller, DRY.delay)
+        said[amplitude] = [line for line in found.lines() if "is linear about rest only up to" in line]
+        assert found.as_dict()["linear_to"] == found.linear_to
+    assert said[1e-7] == []
+    assert len(said[1e-3]) == 1
+    assert "which these lines (of motion up to 1 mrad) do not describe" in said[1e-3][0]
+    assert 1e-6 < found.linear_to < 1e-4
+
+
+@pytest.mark.parametrize("width", [5e-6, 5e-7])
+def test_a_dead_band_is_refused(width, bent):
+    """Its slope at rest is 0: no controller, whatever moves."""
+    with pytest.raises(InputError, match=r"bent has a dead band about rest \(it answers changes of 1e-0"):
+        linearised(bent(DEAD, width), 1e-6, 100.0)
+
+
+def test_a_dead_band_wider_than_what_is_tried_is_said(bent):
+    assert linear_to(bent(DEAD, 1e-4), 5e-5, 20.0) == 5e-5
+    assert linear_to(bent(DEAD, 1e-4), 1e-2, 20.0) < 1e-4
+
+
+def test_what_an_observer_of_friction_is_about_rest_ends_where_its_bristle_slides():
+    """Its stiffness was said of a motion ten times as large as the way to break-away."""
+    values = {"sigma0": 3.5e4, "sigma1": 0.1, "fc": 0.285, "fs": 0.335, "vs": 0.01, "correction": 1.0}
+    controller, _ = placed("PD", 20.0, observer=ControlBlock("lugre_observer", **values))
+    assert linearised(controller, 1e-4, 100.0).state_space()[3] > 1e4
+    assert linear_to(controller, 1e-6, 100.0) == 1e-6
+    assert linear_to(controller, 1e-4, 100.0) < values["fs"] / values["sigma0"]
+    found = controller_stability(axis_of(DRY, 1e-4), controller, DRY.delay)
+    assert "linear about rest only up to" in "\n".join(found.lines())
 
 
 FILE = """

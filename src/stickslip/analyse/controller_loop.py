@@ -4,7 +4,8 @@ The matrices are taken from the text that runs: what one sample of the compositi
 number that it remembers, and of the measured angle. A friction law that a block holds is the spring and damper that it
 is for motion of that amplitude (`stickslip.analyse.presliding_loop.describing`), and nothing while it slides. What a
 law does only at its torque limit, or only while the reference rests, does not enter. A law that is not smooth about
-rest is refused.
+rest is refused, and one that is dead there. What is smooth may bend soon: `linear_to` says up to which motion the
+matrices are the law's.
 """
 
 from __future__ import annotations
@@ -45,8 +46,15 @@ within 1e-6 rad a sample. What bends within the smallest one too is a sign for e
 BENT = 1e-4
 """Part by which answers to changes of other sizes may differ where a law is linear about rest."""
 
+DEAD = 1e-6
+"""Part of its slope for larger changes below which a law does not answer smaller ones."""
+AGREES = 0.2
+"""Part of the largest torque by which a motion's torque may differ from that of the matrices that stand for it."""
+FINER = math.sqrt(10.0)
+"""Between the sizes of motions that are tried."""
+
 LONG = 200
-"""Samples over which numbers are compared in size."""
+"""Samples over which numbers are compared in size, and torques of a motion."""
 SPANNED = 1e-9
 """Part of a vector that has to be new for a motion of its own."""
 
@@ -130,21 +138,21 @@ def linearised(
     ----------
     controller : Controller
     amplitude, frequency : float
-        Of the small motion that held friction laws see, rad and Hz; an infinite amplitude for laws that slide.
+        Of the small motion that held friction laws see, rad and Hz; an infinite amplitude for laws that slide. Other
+        laws are what they are for changes so small that they do not bend: maybe of a smaller motion, `linear_to`.
     delay : float
         Of the torque, samples.
 
     Raises
     ------
     InputError
-        If a law is not smooth about rest, or the controller acts in continuous time.
+        If a law is not smooth about rest or has a dead band there, or the controller acts in continuous time.
     """
     if controller.sample_time == 0.0:
         raise InputError(
             "stability: the controller acts in continuous time; give it a sample_time greater than 0"
         )
-    sticking = with_springs(replace(controller, torque_limit=math.inf), amplitude, frequency)
-    run = _Sample(sticking)
+    run = _about_rest(controller, amplitude, frequency)
     found = [_slope(run, row, controller) for row in np.eye(run.size + 1)]
     whole = np.array(found).T  # what every number becomes, and the torque, by what changed it
     n = run.size
@@ -159,13 +167,69 @@ def _slope(run: _Sample, row: Array, controller: Controller) -> Array:
         ahead, back, further = (run.answers(h * row) / h for h in (size, -size, 10.0 * size))
         off = max(float(np.abs(one - ahead).max()) for one in (back, further))
         if off <= BENT * max(float(np.abs(ahead).max()), 1.0):
-            return 0.5 * (ahead + back)
+            found = 0.5 * (ahead + back)
+            _refuse_dead_band(run, row, controller, found, size)
+            return found
     raise InputError(
         f"controller: {_suspects(controller)} is not smooth about rest (it answers changes of {SIZES[-1]:g} and of "
         f"{10.0 * SIZES[-1]:g} of {run.name_of(int(row.argmax()))} by other slopes), so that there is no linear loop; "
         "write a smooth function in place of a sign or a jump, tanh(v / v_s) or a boundary layer, or simulate it "
         "(`stickslip simulate`, `stickslip rig run track`)"
     )
+
+
+def _refuse_dead_band(run: _Sample, row: Array, controller: Controller, found: Array, size: float) -> None:
+    """`InputError` where no answer to changes of one size becomes an answer to larger ones: that loop stands still."""
+    for larger in (one for one in (10.0 * SIZES[0], *SIZES) if one > size):
+        slope = 0.5 * (run.answers(larger * row) - run.answers(-larger * row)) / larger
+        most = max(float(np.abs(slope).max()), 1.0)
+        if np.any((np.abs(found) <= DEAD * most) & (np.abs(slope) > BENT * most)):
+            raise InputError(
+                f"controller: {_suspects(controller)} has a dead band about rest (it answers changes of {larger:g} of "
+                f"{run.name_of(int(row.argmax()))}, and not those of {size:g}), so that the loop about rest is not "
+                "that of any motion; leave the dead band out here, or simulate it (`stickslip simulate`, "
+                "`stickslip rig run track`)"
+            )
+
+
+def linear_to(controller: Controller, amplitude: float, frequency: float) -> float:
+    """The motion up to which the laws are what `linearised` makes of them, rad: at most `amplitude`, 0 for none.
+
+    A sine of the measured angle goes through samples and matrices; their torques must agree within `AGREES`.
+
+    Parameters
+    ----------
+    controller : Controller
+    amplitude, frequency : float
+        Of the sine, rad and Hz: at least a period in `LONG` samples, at most one in four.
+
+    Raises
+    ------
+    InputError
+        As of `linearised`.
+    """
+    a, b, c, d = linearised(controller, amplitude, frequency).matrices
+    turn = min(max(frequency * controller.sample_time, 1.0 / LONG), 0.25)
+    sine = np.sin(2.0 * math.pi * turn * np.arange(1, LONG + 1))
+    x, unit = np.zeros((len(a), 1)), np.zeros(LONG)
+    for i, angle in enumerate(sine.tolist()):
+        unit[i] = (c @ x).item() + d * angle
+        x = a @ x + b * angle
+    run = _about_rest(controller, amplitude, frequency)
+    still = run.torques(0.0 * sine)
+    size = amplitude
+    while size >= SIZES[-1]:
+        told = run.torques(size * sine) - still
+        most = max(float(np.abs(told).max()), size * float(np.abs(unit).max()))
+        if float(np.abs(told - size * unit).max()) <= AGREES * most:
+            return size
+        size /= FINER
+    return 0.0
+
+
+def _about_rest(controller: Controller, amplitude: float, frequency: float) -> _Sample:
+    """A sample of the controller without its torque limit, held friction laws as springs."""
+    return _Sample(with_springs(replace(controller, torque_limit=math.inf), amplitude, frequency))
 
 
 def moved_and_felt(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array]:
@@ -247,6 +311,17 @@ class _Sample:
     def answers(self, change: Array) -> Array:
         """What the sample makes of a change, shape (size + 1,): of every number, and of the torque."""
         return self._after(change) - self.unchanged
+
+    def torques(self, angles: Array) -> Array:
+        """The torques of samples from rest on, N·m; no numbers from where the law gives none."""
+        m, z, u = _copied(self.m), _copied(self.z), _copied(self.u)
+        out = np.full(len(angles), math.nan)
+        for i, angle in enumerate(angles.tolist()):
+            try:
+                out[i] = self._torque(angle, m, z, u)
+            except InputError:  # LawError too: of this motion it says enough that there is no torque
+                break
+        return out
 
     def _after(self, change: Array) -> Array:
         m, z, u = _copied(self.m), _copied(self.z), _copied(self.u)

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.analyse.controller_loop import LinearController, linearised
+from stickslip.analyse.controller_loop import LinearController, linear_to, linearised
 from stickslip.analyse.presliding_loop import Axis, Loop, Poles
 from stickslip.analyse.stability import AMPLITUDES, SLOW, edge, stable
 from stickslip.analyse.stability_result import Cycle
+from stickslip.analyse.wording import quantity
 from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
@@ -81,6 +82,8 @@ class ControllerStability:
         The part of the contact that may be missing while it sticks; NaN where the loop is unstable anyway.
     cycle : Cycle or None
         Where an unstable loop ends while it sticks.
+    linear_to : float
+        Motion at the encoder up to which the laws are linear, rad, and these loops theirs; at most `reach`.
     frequency, response : arrays, shape (n,)
         Hz, and the transfer function from error to torque while the contact sticks, N·m/rad, complex.
     """
@@ -93,15 +96,21 @@ class ControllerStability:
     estimator_delay: float
     softer: float
     cycle: Cycle | None
+    linear_to: float
     frequency: Array
     response: Any
+
+    @property
+    def reach(self) -> float:
+        """The largest motion that is spoken of, rad: the small one, or what it grows to."""
+        return reach_of(self.amplitude, self.cycle)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {
             "laws": list(self.laws), "amplitude": self.amplitude, "contact_stiffness": self.stiffness,
             "sample_time": self.sample_time, "estimator_delay": self.estimator_delay, "softer": self.softer,
-            "cycle": vars(self.cycle) if self.cycle else None,
+            "cycle": vars(self.cycle) if self.cycle else None, "linear_to": self.linear_to,
             "loops": [
                 {
                     "name": loop.name, "stable": loop.poles.stable, "growth": loop.poles.growth,
@@ -132,6 +141,20 @@ class ControllerStability:
                 else f"sticking, it ends in a cycle of {1e6 * self.cycle.amplitude:.0f} µrad at "
                 f"{self.cycle.frequency:.0f} Hz"
             )
+        if self.linear_to < self.reach:
+            least = f"up to {quantity(self.linear_to, 'rad')}" if self.linear_to > 0.0 else "in no motion"
+            yield (
+                f"the controller is linear about rest only {least}; beyond that it is another loop, which these lines "
+                f"(of motion up to {quantity(self.reach, 'rad')}) do not describe: simulate it (--confirm, `stickslip "
+                "rig run track`)"
+            )
+
+
+def reach_of(amplitude: float, cycle: Cycle | None) -> float:
+    """The largest motion of a loop, rad; of one that grows on, the largest one that is tried."""
+    if cycle is None:
+        return amplitude
+    return min(cycle.amplitude, float(AMPLITUDES[-1]) * amplitude)
 
 
 def controller_stability(axis: Axis, controller: Controller, delay: float = 0.0) -> ControllerStability:
@@ -147,7 +170,7 @@ def controller_stability(axis: Axis, controller: Controller, delay: float = 0.0)
     Raises
     ------
     InputError
-        If a law is not smooth about rest.
+        If a law is not smooth about rest, or has a dead band there.
     ParameterError
         If `delay` is out of bounds.
     """
@@ -162,10 +185,13 @@ def controller_stability(axis: Axis, controller: Controller, delay: float = 0.0)
     frequency = np.geomspace(0.1, 0.5 / drive.sample_time, DRAWN)
     estimator = controller.blocks["estimator"]
     late = estimator.law.delay(estimator.parameters, drive.sample_time) if estimator.law.delay else math.nan
+    cycle = cycle_of(axis, controller, delay, sticking.poles)
+    ringing = sticking.poles.frequency if sticking.poles.frequency >= SLOW else axis.ringing
+    straight = linear_to(controller, reach_of(axis.amplitude, cycle), ringing)
     return ControllerStability(
         tuple(f"{part}: {block.law.name}" for part, block in controller.blocks.items()),
         (sticking, margins("sliding", slid(axis), free)), axis.amplitude, drivetrain.visible, drive.sample_time, late,
-        softer, cycle_of(axis, controller, delay, sticking.poles), frequency, -drive.response(frequency),
+        softer, cycle, straight, frequency, -drive.response(frequency),
     )  # fmt: skip
 
 
