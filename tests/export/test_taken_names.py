@@ -63,6 +63,21 @@ def test_a_name_that_is_taken_in_the_language_is_refused(to, name):
         ss.export(LAW, to=to, name=name)
 
 
+@pytest.mark.parametrize(
+    ("to", "stem"), [("modelica", "model"), ("python", "random"), ("c99", "math"), ("linuxcnc", "pin")]
+)
+def test_a_files_name_that_is_taken_is_changed_with_a_note(to, stem, tmp_path):
+    """`identify` saves model.toml, which `--to modelica` refused for a name that nobody had given."""
+    text = 'law = "coulomb"\n\n[parameters]\nfc = 0.3\nsigma2 = 0.02\n'
+    for name in (stem, "axis"):
+        (tmp_path / f"{name}.toml").write_text(text)
+    made = ss.export(tmp_path / f"{stem}.toml", to=to)
+    assert made.name == f"{stem}_friction"
+    assert any(f"{stem} is taken in {to}; --name NAME" in note for note in made.notes)
+    free = ss.export(tmp_path / "axis.toml", to=to)
+    assert free.name == "axis" and not any("is taken" in note for note in free.notes)
+
+
 def test_a_block_that_is_renamed_says_so():
     assert any("the block is called IF_var" in note for note in ss.export(LAW, to="st", name="IF").notes)
     assert not any("is called" in note for note in ss.export(LAW, to="st", name="axis").notes)

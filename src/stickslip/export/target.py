@@ -104,6 +104,13 @@ class Target:
                 f"{name}_friction"
             )
 
+    def name_like(self, name: str) -> tuple[str, tuple[str, ...]]:
+        """A name that nobody gave, made free where it is taken in the target's language; and the note that says so."""
+        if name not in self.reserved:
+            return name, ()
+        free = f"{name}_friction"
+        return free, (f"the name is {free}, since {name} is taken in {self.name}; --name NAME gives another",)
+
     @property
     def carries(self) -> str:
         """What of a model it holds, for people."""

@@ -145,7 +145,8 @@ def export(
     folder : path, optional
         Where the files are written; without it they are in ``files`` of the result alone.
     name : str, optional
-        Prefix of every name in the target's language; that of the file unless given.
+        Prefix of every name in the target's language; that of the file unless given, with ``_friction`` behind it
+        and a note where that one is taken.
     single : bool
         Single precision, where the target has it.
     controller : bool
@@ -200,8 +201,7 @@ def export(
     controller = controller or isinstance(source, Controller) or (whole and compensator is None)
     refuse_controllers(chosen, controller, compensator)
     content = content_of(source)
-    own = name or re.sub(r"[^A-Za-z0-9_]+", "_", Path(content.document.name).stem)
-    chosen.insist_on_name(own)
+    own, renamed = named(chosen, name, content)
     if compensator is None and options.given:
         option = options.given[0].replace("_", "-")
         raise InputError(f"--{option} belongs to --compensator; give both or neither")
@@ -210,11 +210,30 @@ def export(
     if controller or compensator:
         settings_of(chosen, settings or {})
         result = exported_controller(source, content, chosen, own, options, compensator, single, check)
-        return saved(result, folder)
+        return saved(with_notes(result, renamed), folder)
     job = job_of(source, content, own, chosen)
     given = {**job.settings, **(settings or {})}
     job = replace(job, single=single, nearest=nearest, top_speed=top_speed, settings=given)
-    return saved(exported_law(content, job, chosen, check), folder)
+    return saved(with_notes(exported_law(content, job, chosen, check), renamed), folder)
+
+
+def named(chosen: Target, name: str | None, content: Table) -> tuple[str, tuple[str, ...]]:
+    """The name given, else that of the source's file, which is changed with a note where the target has it.
+
+    Raises
+    ------
+    InputError
+        If the name given is taken.
+    """
+    if name:
+        chosen.insist_on_name(name)
+        return name, ()
+    return chosen.name_like(re.sub(r"[^A-Za-z0-9_]+", "_", Path(content.document.name).stem))
+
+
+def with_notes(result: ExportResult, more: tuple[str, ...]) -> ExportResult:
+    """The result with more to say, first."""
+    return replace(result, notes=(*more, *result.notes))
 
 
 def exported_map(
