@@ -75,7 +75,8 @@ def test_a_files_name_that_is_taken_is_changed_with_a_note(to, stem, tmp_path):
     assert made.name == f"{stem}_friction"
     assert any(f"{stem} is taken in {to}; --name NAME" in note for note in made.notes)
     free = ss.export(tmp_path / "axis.toml", to=to)
-    assert free.name == "axis" and not any("is taken" in note for note in free.notes)
+    assert free.name == "axis"
+    assert not any("is taken" in note for note in free.notes)
 
 
 def test_a_block_that_is_renamed_says_so():

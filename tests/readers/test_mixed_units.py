@@ -99,13 +99,26 @@ def test_a_lead_that_is_none(tmp_path, capsys, lead):
 
 
 def test_a_linear_motors_constant_is_no_screws_and_no_turning_motors(tmp_path):
-    for beside in ({"lead": LEAD}, {"torque_constant": 2.0}):
+    for beside in ({"lead": LEAD}, {"torque_constant": 2.0}, {"gear_ratio": 5.0, "side": "load"}):
         with pytest.raises(InputError, match=r"force_constant = 3 N/A is a linear motor's.*give one of them"):
             Drive(force_constant=3.0, **beside)
     path = written(tmp_path / "log.csv", "time [s],position [deg],current [A]", Q, TORQUE)
     with pytest.raises(InputError, match="positions are angles; give --torque-constant"):
         read(path, drive=Drive(force_constant=3.0))
-    kept = Profile({}, Drive(torque_constant=2.0, gear_ratio=5.0))
-    assert merged([], Drive(force_constant=3.0), None, kept).drive == Drive(
-        force_constant=3.0, gear_ratio=5.0
-    )
+
+
+@pytest.mark.parametrize(
+    ("kept", "said", "left"),
+    [
+        ({"torque_constant": 2.0, "gear_ratio": 5.0}, {"force_constant": 3.0}, {"force_constant": 3.0}),
+        ({"lead": LEAD, "rated_current": 4.0}, {"force_constant": 3.0}, {"force_constant": 3.0, "rated_current": 4.0}),
+        ({"force_constant": 3.0}, {"lead": LEAD}, {"lead": LEAD}),
+        ({"force_constant": 3.0}, {"torque_constant": 2.0}, {"torque_constant": 2.0}),
+        ({"force_constant": 3.0}, {"gear_ratio": 5.0}, {"gear_ratio": 5.0}),
+        ({"force_constant": 3.0}, {"rated_current": 4.0}, {"force_constant": 3.0, "rated_current": 4.0}),
+        ({"lead": LEAD}, {"torque_constant": 2.0}, {"lead": LEAD, "torque_constant": 2.0}),
+    ],
+)  # fmt: skip
+def test_what_is_said_of_one_motor_takes_the_place_of_what_a_profile_says_of_the_other(kept, said, left):
+    """One option given ended in "give one of them", since the profile had the other."""
+    assert merged([], Drive(**said), None, Profile({}, Drive(**kept))).drive == Drive(**left)

@@ -37,6 +37,8 @@ NUMBERS = (
     "counts_per_rev", "rated_torque", "rated_current", "torque_constant", "force_constant", "gear_ratio", "lead",
 )  # fmt: skip
 """What a drive's data sheet says, each a positive number."""
+TURNING = ("torque_constant", "lead", "gear_ratio")
+"""What only a motor that turns has: a linear one has `force_constant` in their place."""
 LONGEST_LEAD = 1.6
 """m a revolution, of a drum of half a metre: a lead in millimetres is more, but for the finest screws."""
 
@@ -56,7 +58,7 @@ class Drive:
     torque_constant : float
         N·m/A, for torque = current x torque constant.
     force_constant : float
-        N/A, the same of a linear motor.
+        N/A, the same of a linear motor, which has neither lead nor gear.
     gear_ratio : float
         Revolutions of the motor for one of the load.
     side : {"motor", "load"}
@@ -80,7 +82,7 @@ class Drive:
             value = getattr(self, name)
             if not math.isnan(value) and not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"{name} = {value:g} must be greater than 0")
-        others = [n for n in ("torque_constant", "lead") if not math.isnan(getattr(self, n))]
+        others = [n for n in TURNING if not math.isnan(getattr(self, n))]
         if others and not math.isnan(self.force_constant):
             raise InputError(
                 f"force_constant = {self.force_constant:g} N/A is a linear motor's, and {others[0]} = "
@@ -306,14 +308,14 @@ def _torque_from_current(
     known = not (math.isnan(drive.torque_constant) and math.isnan(drive.force_constant))
     if "motor_torque" in channels or "current" not in channels or not known:
         return {}, []
+    along = linear or any(units[c].startswith("m") for c in channels if c in MOTION)
+    if not math.isnan(drive.force_constant):
+        return _force_from_current(channels, units, drive.force_constant, along), []
+    said: list[Finding] = []
     factor, gear = drive.torque_constant, ""
     if drive.side == "load" and not math.isnan(drive.gear_ratio):
         factor *= drive.gear_ratio
         gear = f" x gear ratio {drive.gear_ratio:g}"
-    said: list[Finding] = []
-    along = linear or any(units[c].startswith("m") for c in channels if c in MOTION)
-    if not math.isnan(drive.force_constant):
-        return _force_from_current(channels, units, drive.force_constant, along), []
     unit = SI["force" if along else "torque"]
     constant = f"{drive.torque_constant:g} {unit}/A"
     if along and not math.isnan(drive.lead):

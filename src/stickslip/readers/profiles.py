@@ -21,7 +21,7 @@ from stickslip.config import read_toml
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers._choose import parse_mapping
-from stickslip.readers.convert import Drive
+from stickslip.readers.convert import TURNING, Drive
 from stickslip.readers.table_columns import Table
 from stickslip.record import Record
 
@@ -30,8 +30,8 @@ NUMBERS_BEHIND = {
     "torque": ("torque_constant", "force_constant", "rated_torque", "rated_current", "gear_ratio", "lead"),
 }
 """Numbers of the drive on which the size of a signal depends."""
-OF_ONE_MOTOR = {"torque_constant", "force_constant"}
-"""Of which a motor has one; what is said now takes the place of the other."""
+PUTS_OUT = {"force_constant": TURNING, **dict.fromkeys(TURNING, ("force_constant",))}
+"""What is said now of a linear motor takes the place of what a profile says of one that turns, and the other way."""
 OTHER = 4.0
 """Times as large, or as small, from which on it is asked whether they hold."""
 
@@ -148,8 +148,8 @@ def merged(mapping: Sequence[str], drive: Drive, sample_time: float | None, kept
     """What is said now over what a profile says."""
     before = kept or Profile({}, Drive())
     said = drive.known()
-    over = OF_ONE_MOTOR & said.keys()  # a linear motor has neither what turns has, nor the other way round
-    numbers = {n: x for n, x in before.drive.known().items() if not over or n not in OF_ONE_MOTOR} | said
+    out = {kept for name in said for kept in PUTS_OUT.get(name, ())}
+    numbers = {n: x for n, x in before.drive.known().items() if n not in out} | said
     if drive.side == "motor" and before.drive.side == "load":
         numbers["side"] = "load"
     period = sample_time if sample_time is not None else before.sample_time
