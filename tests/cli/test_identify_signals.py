@@ -85,6 +85,53 @@ def test_a_motors_constant_is_used_or_refused(duty, capsys, options, said):
     assert said in capsys.readouterr().err
 
 
+def linear(position: np.ndarray, **columns: np.ndarray) -> str:
+    return written("linear.csv", **{"time [s]": TIME, "position [m]": position, **columns})
+
+
+def test_the_force_constant_drives_a_linear_axis_by_its_voltage(duty, capsys):
+    """It was read and nothing else, so that a voltage asked for a torque constant, which a linear motor has not."""
+    position, supply = duty
+    loop = ["--loop", "kp=1.5,kd=0.02,kr=0.02,limit=1", "--resistance", "0.1"]
+    reference = cases.wanted(TIME, 0)
+    log = linear(position, **{"position_reference [m]": reference, "supply [V]": supply})
+    assert main(["identify", log, *FAST, "--inverse", *loop]) == 2
+    assert "of a linear motor --force-constant" in capsys.readouterr().err
+    for force in (["--force-constant", "0.05"], []):  # the second time it is the saved profile's
+        assert main(["identify", log, *FAST, "--inverse", *loop, *force]) == 0
+        assert found(capsys)["fc"] == pytest.approx(cases.FC, rel=0.05)
+
+
+def test_what_a_profile_kept_of_a_motor_that_turns_is_neither_used_nor_told(duty, capsys):
+    log = linear(duty[0], **{"current [A]": np.sign(np.gradient(duty[0]))})
+    main(["doctor", log, "--torque-constant", "0.1", "--lead", "5"])
+    capsys.readouterr()
+    main(["doctor", log, "--force-constant", "3"])
+    said = capsys.readouterr().out
+    assert "current x force constant 3 N/A" in said
+    assert "lead = " not in said
+
+
+def test_a_force_constant_that_is_not_used_is_refused(duty, capsys):
+    position = duty[0]
+    log = linear(position, **{"motor_torque [N]": np.sign(np.gradient(position))})
+    assert main(["identify", log, *FAST, "--inverse", "--force-constant", "3"]) == 2
+    assert "--force-constant 3 would not be used: the drive's signal is a torque" in capsys.readouterr().err
+    assert main(["identify", servo(duty), *FAST, "--inverse", "--force-constant", "3", "--loop", "kp=1"]) == 2
+    assert (
+        "--force-constant 3 is a linear motor's, and the record's positions are angles"
+        in capsys.readouterr().err
+    )
+
+
+def test_a_current_of_a_linear_axis_asks_for_its_force_constant(duty, capsys):
+    log = linear(duty[0], **{"current [A]": np.sign(np.gradient(duty[0]))})
+    for verb in (["doctor"], ["identify", "--method", "sliding"]):
+        assert main([*verb, log]) == 2
+        streams = capsys.readouterr()
+        assert "--force-constant" in streams.out + streams.err
+
+
 def test_a_constant_voltage_is_taken_for_the_supply(duty, capsys):
     assert main(["doctor", servo(duty), "--map", "voltage=input_volts", "--map", "supply=none"]) == 0
     assert "say --map supply=input_volts --map voltage=none" in capsys.readouterr().out

@@ -81,7 +81,8 @@ class Motor:
         value = getattr(self, name)
         if value is None:
             option = f"--{name.replace('_', '-')}"
-            also = "" if name == "resistance" else ", or --drive-gain, the torque per unit of the signal"
+            also = ", or --drive-gain, the torque per unit of the signal (of a linear motor --force-constant)"
+            also = "" if name == "resistance" else also
             raise ParameterError(
                 f"motor: a drive signal that is a {quantity} needs {name}; give {option}{also}"
             )

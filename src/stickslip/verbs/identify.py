@@ -136,7 +136,7 @@ position_map, load, intervals, robust
         model if model is None or isinstance(model, Model) else Model.from_file(model), noise, torque_channel, elements,
         threshold, 0, inverse, per_direction, pendulum, drive_gain, reading.get("torque_constant"), resistance,
         loop_output, extra_torque, torque_is, delay, harmonics, load, intervals, robust, regress, progress,
-        position_map,
+        position_map, reading.get("force_constant"),
     )  # fmt: skip
     examiner = Examiner((*accept, *(["missing-column"] if kind.takes_current else [])), regress, tell)
     sources = sources_of(logs, _listed(hold_out), loop, reading, examiner)

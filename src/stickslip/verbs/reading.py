@@ -38,7 +38,9 @@ NUMBERS = (
 ARRAYS = (*SIGNALS, "units")
 """What says the signals themselves."""
 PART = ("start", "end", "rows", "leave_out", "unwrap")
-COLUMNS = ("map", "profile", "sample_time", "beside", *(n for n in NUMBERS if n != "torque_constant"), "side")
+MOTORS = ("torque_constant", "force_constant")
+"""What identification, too, multiplies a current or a voltage by."""
+COLUMNS = ("map", "profile", "sample_time", "beside", *(n for n in NUMBERS if n not in MOTORS), "side")
 """What a record that is read already has no use for."""
 
 
@@ -340,8 +342,9 @@ def _profile_notes(
     notes: list[Finding] = []
     if kept:
         now, before = said.drive.known(), kept.drive.known()
+        held = profiles.merged([], said.drive, None, kept).drive.known()
         more = [f"{role}={text}" for role, text in kept.mapping.items() if role not in said.mapping]
-        more += [f"{name} = {value}" for name, value in before.items() if name not in now]
+        more += [f"{name} = {value}" for name, value in before.items() if name not in now and name in held]
         more += ["side = load"] if (before["side"], now["side"]) == ("load", "motor") else []
         if kept.sample_time is not None and said.sample_time is None:
             more.append(f"sample_time = {kept.sample_time:g} s")

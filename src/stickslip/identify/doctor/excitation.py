@@ -31,11 +31,12 @@ def channels(view: View) -> Iterator[Finding]:
         )
     if not view.torque_channel:
         if view.has("current"):
+            screw = "give --force-constant N_PER_A, or of a screw --torque-constant NM_PER_A and --lead MM"
             yield Finding(
                 "error",
                 "missing-column",
                 "there is current but no torque",
-                remedy="give --torque-constant NM_PER_AMPERE",
+                remedy=screw if view.effort == "N" else "give --torque-constant NM_PER_AMPERE",
             )
         else:
             yield Finding(

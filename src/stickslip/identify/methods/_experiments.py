@@ -16,6 +16,7 @@ from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Loop
 
+MOTORS = ("torque_constant", "force_constant")
 BESIDE_GAINS = ("limit", "filter", "period", "count", "span")
 NOT_NEGATIVE = (*Gains._fields, *Cascade._fields, "filter", "period", "count")
 RANGES = {"limit": "greater than 0", **dict.fromkeys(NOT_NEGATIVE, "a finite number of 0 or more")}
@@ -38,8 +39,10 @@ def refuse_unused(records: Sequence[Record], experiments: Sequence[Experiment], 
     quantities = {t.quantity for t in experiments} if options.drive_gain is None else {"gain"}
     derived = any("motor_torque" in r.meta.get("derived", {}) for r in records)
     unused: list[str] = []
-    if options.torque_constant is not None and not quantities & {"current", "voltage"} and not derived:
-        unused.append(f"--torque-constant {options.torque_constant:g}")
+    for name in MOTORS:
+        value = getattr(options, name)
+        if value is not None and not quantities & {"current", "voltage"} and not derived:
+            unused.append(f"--{name.replace('_', '-')} {value:g}")
     if options.resistance is not None and "voltage" not in quantities:
         unused.append(f"--resistance {options.resistance:g}")
     if unused:
@@ -53,16 +56,34 @@ def refuse_unused(records: Sequence[Record], experiments: Sequence[Experiment], 
 
 def axis_of(record: Record, options: Options) -> ServoAxis:
     """The axis; the reader has brought the record to one side of the gearing already."""
-    known = record.meta.get("reading", {}).get("drive", {})  # a profile's, too
-    constant = options.torque_constant
+    linear = record.units.get("position") == "m"
     return ServoAxis(
-        motion="linear" if record.units.get("position") == "m" else "rotary", drive_side="load",
+        motion="linear" if linear else "rotary", drive_side="load",
         gravity="pendulum" if options.pendulum else "constant", drive_gain=options.drive_gain,
         motor=Motor(
-            torque_constant=constant if constant is not None else known.get("torque_constant"),
+            torque_constant=motor_constant(record, options, linear),
             resistance=options.resistance,
         ),
     )  # fmt: skip
+
+
+def motor_constant(record: Record, options: Options, linear: bool) -> float | None:
+    """Torque per current, N·m/A (N/A of a linear axis), as the options say or else what the record was read by.
+
+    Raises
+    ------
+    InputError
+        If the options give a linear motor's to an axis that turns.
+    """
+    if options.force_constant is not None and not linear:
+        raise InputError(
+            f"--force-constant {options.force_constant:g} is a linear motor's, and the record's positions are angles; "
+            "leave it out, or give --torque-constant NM_PER_A"
+        )
+    known = record.meta.get("reading", {}).get("drive", {})  # a profile's, too
+    said = [getattr(options, name) for name in MOTORS]
+    kept = [known.get(name) for name in (MOTORS if linear else MOTORS[:1])]
+    return next((value for value in (*said, *kept) if value is not None), None)
 
 
 def experiment(record: Record, axis: ServoAxis, options: Options) -> Experiment:

@@ -25,7 +25,7 @@ def torque_channel(records: Sequence[Record], options: Options, method: str) -> 
             return name
     raise InputError(
         f"{method} needs a torque in every record; map a column with --map torque=COLUMN:UNIT, or give "
-        "--torque-constant for a current"
+        "--torque-constant for a current (of a linear motor --force-constant)"
     )
 
 

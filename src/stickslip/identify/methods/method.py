@@ -53,8 +53,8 @@ class Options:
         Gravity is m g l sin(q - q0), otherwise a constant torque (axis).
     drive_gain : float or None
         Torque per unit of the drive's signal.
-    torque_constant : float or None
-        N·m/A
+    torque_constant, force_constant : float or None
+        N·m/A of a motor that turns, N/A of a linear one.
     resistance : float or None
         Of the motor, ohm, where a voltage drives it.
     loop_output : {"torque", "current", "voltage"} or None
@@ -110,6 +110,7 @@ class Options:
     regress: Regress = regress_axis
     progress: Callable[[str], None] = silent
     position_map: bool = False
+    force_constant: float | None = None
 
     def __post_init__(self) -> None:
         for option, count in (("harmonics", self.harmonics), ("elements", self.elements)):
