@@ -178,6 +178,26 @@ def test_a_rate_that_a_column_of_times_contradicts_is_said(signals: dict[str, np
     assert f"{step:g} s apart" in found["time-overruled"].message
 
 
+def test_whole_milliseconds_of_a_fast_log_do_not_contradict_its_rate(signals: dict[str, np.ndarray]) -> None:
+    """They were said to be 0 s apart."""
+    rows = signals["position"].size
+    columns = {"time [ms]": np.floor(0.25 * np.arange(rows)), "position [rad]": signals["position"]}
+    assert "time-overruled" not in {f.code for f in ss.doctor(columns, sample_time=0.25e-3).findings}
+    found = {f.code: f for f in ss.doctor(columns, sample_time=1e-3).findings}["time-overruled"]
+    apart = float(found.message.rpartition("rows are ")[2].split()[0])
+    assert apart == pytest.approx(0.25e-3, rel=1e-2)
+    assert found.remedy == "leave --sample-time out if the column is right"
+
+
+def test_a_rate_of_a_profile_that_a_column_contradicts_names_the_profile(
+    signals: dict[str, np.ndarray], tmp_path: Path
+) -> None:
+    (tmp_path / "rate.toml").write_text("sample_time = 0.5\n")
+    columns = {"time [s]": signals["t"], "position [rad]": signals["position"]}
+    found = {f.code: f for f in ss.doctor(columns, profile=tmp_path / "rate.toml").findings}
+    assert "the profile says sample_time" in found["time-overruled"].remedy
+
+
 def test_the_doctor_says_the_same_from_python(
     log: Path, signals: dict[str, np.ndarray], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -149,10 +149,20 @@ def record_of(
     choices, findings = choose(table, {**kept, **said})
     choices = [_from_profile(c) if c.role in kept and c.source == "map" else c for c in choices]
     settings = profiles.merged([], drive or Drive(), sample_time, profile).drive
-    period = sample_time if sample_time is not None or profile is None else profile.sample_time
+    remembered = sample_time is None and profile is not None and profile.sample_time is not None
+    period = profile.sample_time if profile and remembered else sample_time
     # Damaged files hold numbers that overflow: they are infinite then, and the doctor finds them.
     with np.errstate(all="ignore"):
-        return convert(table, told(choices, table, settings), settings, period, [*table.findings, *findings])
+        record = convert(
+            table, told(choices, table, settings), settings, period, [*table.findings, *findings]
+        )
+    said_of_it = cast("list[dict[str, Any]]", record.meta["reading"]["findings"])
+    for finding in said_of_it if remembered else ():
+        if finding["code"] == "time-overruled":
+            finding["remedy"] = (
+                "the profile says sample_time: if the column is right, delete that line from its file"
+            )
+    return record
 
 
 def told(choices: Sequence[Choice], table: Table, drive: Drive) -> list[Choice]:
