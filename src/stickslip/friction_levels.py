@@ -8,6 +8,7 @@ beyond the Stribeck effect a line through the curve has Coulomb's level and the 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from stickslip.model import Model
 from stickslip.spec import Surroundings
 
 USUAL_SCALE = 0.01
-"""rad/s, over which a law's torque is taken to change where the law does not say."""
+"""rad/s, over which a law's torque is taken to change where neither the law nor a bend of its curve says."""
 FROM, TO, PER_DECADE = -9, 3, 100
 """Decades of velocity scales on which the end of a slope is looked for, and points in each."""
 ENDED = 1e-3
@@ -30,6 +31,25 @@ STRAIGHT, FARTHER = 5e-3, 8
 not: a smooth law's own scale is that of its slope at rest, and its Stribeck effect ends later."""
 NO_LEVEL = 1e-9
 """Of the torque at speed: less than that at rest is rounding, and the law a viscous one."""
+
+OCTAVE = 4
+"""Of `SEEN`, velocities that lie from one to twice that one."""
+SEEN = 2.0 ** (np.arange(-20 * OCTAVE, 10 * OCTAVE + 1) / OCTAVE)
+"""Velocities at which a bend is looked for, 1e-6 to 1e3 rad/s."""
+LATE = 1.5
+"""The bend of exp(-(v/v_s)^2) over an octave is largest at so many v_s."""
+LEAST = 1e-4
+"""Share of the torque below which nothing bends."""
+MUCH, SOME = 0.3, 0.05
+"""Share of the largest bend from which one counts as the slowest, and as the fastest: a fall begins with a slight bend
+at low velocity, and after it has ended there is none."""
+
+
+class Bends(NamedTuple):
+    """Velocities at which a sliding curve bends, rad/s; 0 of a straight line."""
+
+    slowest: float
+    fastest: float
 
 
 class Levels(NamedTuple):
@@ -91,10 +111,29 @@ def line_beyond(model: Model, direction: float = 1.0) -> tuple[float, float]:
     return curve.coulomb, curve.viscous
 
 
-def scale_of(model: Model) -> float:
-    """A velocity over which the law's torque changes much, rad/s; `USUAL_SCALE` where it does not say."""
-    scale = model.law.velocity_scale
-    return (float(scale(model.parameters)) if scale else 0.0) or USUAL_SCALE
+def bends_of(torque: Callable[[float], float]) -> Bends:
+    """Where a torque against velocity, N·m against rad/s, bends much: of a smooth law where its sign has ended, and
+    where its Stribeck effect has."""
+    seen = np.array([_or_nan(torque, v) for v in SEEN.tolist()])
+    end = int(np.argmin(np.isfinite(seen))) if not np.isfinite(seen).all() else seen.size
+    if end < 2 * OCTAVE + 3:
+        return Bends(0.0, 0.0)
+    before, here, after = seen[: end - 2 * OCTAVE], seen[OCTAVE : end - OCTAVE], seen[2 * OCTAVE : end]
+    bends = np.abs(after - 3.0 * here + 2.0 * before)  # 0 of any straight line
+    bends[bends <= LEAST * np.abs(here)] = 0.0
+    peaks = 1 + np.flatnonzero((bends[1:-1] >= bends[:-2]) & (bends[1:-1] > bends[2:]))
+    if not peaks.size:
+        return Bends(0.0, 0.0)
+    at, share = SEEN[OCTAVE + peaks] / LATE, bends[peaks] / bends[peaks].max()
+    return Bends(float(at[share >= MUCH][0]), float(at[share >= SOME][-1]))
+
+
+def _or_nan(torque: Callable[[float], float], velocity: float) -> float:
+    """The torque; NaN where a law written by hand is not defined so far out."""
+    try:
+        return torque(velocity)
+    except ArithmeticError:
+        return math.nan
 
 
 def independent(model: Model) -> Model:
@@ -130,7 +169,9 @@ class _Curve:
     def __init__(self, model: Model, direction: float) -> None:
         bare = independent(model)
         self.law, self.p, self.direction = bare.law, bare.parameters, direction
-        self.scale = scale_of(bare)
+        self.bend = bends_of(self.torque).fastest if self.law.steady else 0.0
+        stated = float(self.law.velocity_scale(self.p)) if self.law.velocity_scale else 0.0
+        self.scale = stated or self.bend or USUAL_SCALE
         self._line: tuple[float, float] | None = None
 
     def torque(self, velocity: float) -> float:
@@ -193,9 +234,11 @@ class _Curve:
         """Level and slope of the curve beyond its Stribeck effect: of the lines tried, the first that it keeps to, or
         the one that it leaves least."""
         if self._line is None:
+            # The top of a Stribeck effect that ends late is straight, too: no line is laid before the last bend.
+            start = self.bend if self.bend > BEYOND[0] * self.scale else self.scale
             tried: list[tuple[float, float, float]] = []
             while len(tried) <= FARTHER and (not tried or tried[-1][0] > STRAIGHT):
-                tried.append(self._line_at(self.scale * 2.0 ** len(tried)))
+                tried.append(self._line_at(start * 2.0 ** len(tried)))
             _, *line = min(tried)
             self._line = line[0], line[1]
         return self._line

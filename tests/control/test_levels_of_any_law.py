@@ -14,7 +14,7 @@ from stickslip.control.belief import believed
 from stickslip.control.catalogue import CATALOGUE, LOOPS, compensated
 from stickslip.errors import ParameterError
 from stickslip.export._sliding import Curve
-from stickslip.friction_levels import independent, levels_of, static_level
+from stickslip.friction_levels import bends_of, independent, levels_of, static_level
 from stickslip.model import Model
 from stickslip.recommend.candidates import breakaway
 from stickslip.recommend.recommend import laws_of
@@ -48,6 +48,34 @@ def steady(v, p):
 
 LAW = Law("own_smooth", Params, step, title="Smooth Coulomb", equation="F", source=("mine",),
           example={"level": 0.3, "width": 2e-4}, steady=steady)
+'''
+FALL = '''
+"""Stribeck's curve with a smooth sign, without the velocity over which it changes."""
+import math
+from typing import Annotated, NamedTuple
+from stickslip.spec import Law, Par
+
+
+class Params(NamedTuple):
+    """Levels, velocity of the fall, viscous friction."""
+    fs: Annotated[float, Par("N·m", "Fs", "static", positive=True)]
+    fc: Annotated[float, Par("N·m", "Fc", "Coulomb", positive=True)]
+    slow: Annotated[float, Par("rad/s", "w", "velocity of the fall", positive=True)]
+    damping: Annotated[float, Par("N·m·s/rad", "c", "viscous", lower=0.0)]
+
+
+def step(v0, v1, dt, z, p, u):
+    """Torque, N·m."""
+    return steady(v1, p)
+
+
+def steady(v, p):
+    """Torque at constant velocity, N·m."""
+    return math.tanh(2000.0 * v) * (p.fc + (p.fs - p.fc) * math.exp(-((v / p.slow) ** 2))) + p.damping * v
+
+
+LAW = Law("own_fall", Params, step, title="Smooth Stribeck", equation="F", source=("mine",), steady=steady,
+          example={"fs": 0.8, "fc": 0.5, "slow": 3.0, "damping": 0.02})
 '''
 
 
@@ -142,6 +170,30 @@ def test_the_stribeck_effect_of_a_smooth_law_is_not_fed_forward_as_coulombs():
     """Its scale is that of the slope at rest; the line is laid beyond the fall."""
     model = Model("makkar", gamma1=0.2, gamma2=1000.0, gamma3=50.0, gamma4=0.2, gamma5=1000.0, sigma2=0.018)
     assert laws_of(model)["coulomb"].parameters.fc == pytest.approx(0.2, rel=0.03)
+
+
+@pytest.mark.parametrize("slow", [0.1, 3.0, 10.0])
+def test_a_stribeck_effect_that_ends_late_is_not_taken_for_coulombs(slow, tmp_path):
+    """Of a law without a stated velocity the line was laid at 0.05 to 0.5 rad/s, where the top of the fall is flat."""
+    file = Path(tmp_path) / "own_fall.py"
+    file.write_text(FALL, encoding="utf-8")
+    model = Model(plugins.law_in(str(file), file.read_bytes()), fs=0.8, fc=0.5, slow=slow, damping=0.02)
+    for direction in (1.0, -1.0):
+        found = levels_of(model, direction)
+        assert (found.fs, found.fc, found.sigma2) == pytest.approx((0.8, 0.5, 0.02), rel=0.02)
+        assert found.vs == pytest.approx(slow, rel=0.05)
+    assert laws_of(model)["coulomb"].parameters.fc == pytest.approx(0.5, rel=0.01)
+    curve = Curve.of(model)
+    assert 50.0 * slow < curve.top < 200.0 * slow
+
+
+def test_bends_of_a_curve():
+    assert bends_of(lambda v: 0.3 + 2.0 * v) == (0.0, 0.0)
+    slow, fast = bends_of(lambda v: math.tanh(200.0 * v) * (0.5 + 0.3 * math.exp(-((v / 3.0) ** 2))) + v)
+    assert slow == pytest.approx(1.0 / 200.0, rel=0.3)
+    assert fast == pytest.approx(3.0, rel=0.2)
+    # A law written by hand may be defined at low velocities alone.
+    assert bends_of(lambda v: 0.5 + 0.3 / math.cosh(v / 0.01)).fastest == pytest.approx(0.02, rel=0.5)
 
 
 def test_a_curve_that_never_changes_has_a_scale():

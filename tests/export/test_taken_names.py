@@ -6,7 +6,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
-from stickslip.export._sliding import velocity_scale
+from stickslip.export._sliding import slowest_scale, velocity_scale
 
 LAW = ss.Model("coulomb", fc=0.3, sigma2=0.02)
 OWN = '''"""Friction with an excess at low velocity."""
@@ -125,6 +125,16 @@ def test_the_velocity_over_which_an_own_law_changes_is_found(slow, own):
     """It was taken as 0.01 rad/s of any law that does not state it, and a robot got no damping."""
     assert velocity_scale(own(slow=slow)) == pytest.approx(slow, rel=0.3)
     assert velocity_scale(LAW) == 0.0
+
+
+@pytest.mark.parametrize("slow", [0.1, 2.0])
+def test_a_smooth_sign_is_not_the_velocity_over_which_an_own_law_changes(slow, tmp_path):
+    """The top speed was 100 times the width of its sign, and a robot's law was fitted where the fall had not begun."""
+    file = tmp_path / "smooth.py"
+    file.write_text(OWN.replace("math.copysign(shape(v, p), v)", "math.tanh(200.0 * v) * shape(v, p)"))
+    model = ss.Model(str(file), level=0.5, excess=0.15, slow=slow, damping=0.02)
+    assert velocity_scale(model) == pytest.approx(slow, rel=0.3)
+    assert slowest_scale(model) == pytest.approx(1.0 / 200.0, rel=0.3)
 
 
 def test_the_nearest_law_of_a_robot_keeps_the_damping(own):

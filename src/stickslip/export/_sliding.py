@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.friction_levels import independent, static_level
+from stickslip.friction_levels import bends_of, independent, static_level
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
@@ -19,15 +19,6 @@ SCALES = 100.0
 """Stribeck velocities up to which a sliding curve is compared where nothing else is said."""
 WAY = 200
 """Steps of 1 mrad after which a law without sliding curve slides as it always will."""
-
-OCTAVE = 4
-"""Of `SEEN`, velocities that lie from one to twice that one."""
-SEEN = 2.0 ** (np.arange(-20 * OCTAVE, 10 * OCTAVE + 1) / OCTAVE)
-"""Velocities at which a bend is looked for, 1e-6 to 1e3 rad/s."""
-LATE = 1.5
-"""The bend of exp(-(v/v_s)^2) over an octave is largest at so many v_s."""
-LEAST, MUCH = 1e-4, 0.3
-"""Share of the largest torque below which nothing bends, and of the largest bend from which one counts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +57,7 @@ class Curve:
         law, p = self.model.law, self.model.parameters
         if law.rest_band is not None:
             return law.rest_band(p)
-        if law.state_fields or not law.continuous or (scale := velocity_scale(self.model)) == 0.0:
+        if law.state_fields or not law.continuous or (scale := slowest_scale(self.model)) == 0.0:
             return 0.0
         slow = scale * np.logspace(-9.0, 0.0, 500)
         torques = np.array([min(self.torque(v), -self.torque(-v)) for v in slow])
@@ -136,22 +127,13 @@ class Curve:
 def velocity_scale(model: Model) -> float:
     """A velocity over which the law's torque changes much, rad/s; 0 where there is none.
 
-    Of a law that does not tell it, where its sliding curve bends.
+    Of a law that does not tell it, the fastest at which its sliding curve bends: a smooth sign bends, too.
     """
     scale = model.law.velocity_scale
-    return scale(model.parameters) if scale else _bend(Curve(model, 1.0))
+    return scale(model.parameters) if scale else bends_of(Curve(model, 1.0).torque).fastest
 
 
-def _bend(curve: Curve) -> float:
-    """The velocity at which a sliding curve bends most, the slowest of several, rad/s; 0 of a straight line."""
-    torque = np.array([curve.torque(v) for v in SEEN])
-    if not np.isfinite(torque).all():
-        return 0.0
-    before, here, after = (np.roll(torque, k)[OCTAVE:-OCTAVE] for k in (OCTAVE, 0, -OCTAVE))
-    bends = np.abs(after - 3.0 * here + 2.0 * before)  # 0 of any straight line
-    peaks = 1 + np.flatnonzero((bends[1:-1] >= bends[:-2]) & (bends[1:-1] > bends[2:]))
-    largest = float(bends[peaks].max(initial=0.0))
-    if not largest > LEAST * float(np.abs(here).max()):
-        return 0.0
-    first = peaks[bends[peaks] >= MUCH * largest][0]
-    return float(SEEN[OCTAVE:-OCTAVE][first]) / LATE
+def slowest_scale(model: Model) -> float:
+    """As `velocity_scale`, but the slowest: that of a smooth sign, where the law has one."""
+    scale = model.law.velocity_scale
+    return scale(model.parameters) if scale else bends_of(Curve(model, 1.0).torque).slowest
