@@ -184,7 +184,7 @@ class _Curve:
 
     @property
     def coulomb(self) -> float:
-        """Level of the line beyond the Stribeck effect, N·m."""
+        """Level of the line beyond the Stribeck effect, N·m; 0 where it is rounding."""
         return self._beyond()[0]
 
     @property
@@ -252,4 +252,6 @@ class _Curve:
         if slope * v[-1] <= NO_LEVEL * size:
             slope = 0.0
         level = float(np.mean(torque) - slope * np.mean(v))
+        if abs(level) <= NO_LEVEL * size:
+            level = 0.0
         return float(np.max(np.abs(torque - level - slope * v))) / size, level, slope

@@ -196,6 +196,17 @@ def test_bends_of_a_curve():
     assert bends_of(lambda v: 0.5 + 0.3 / math.cosh(v / 0.01)).fastest == pytest.approx(0.02, rel=0.5)
 
 
+def test_a_law_of_ones_own_with_two_directions_is_fed_forward_with_two_levels(tmp_path):
+    """The option `symmetry` was asked for, which a law of one's own has not: its mean direction was the forward one."""
+    each = FALL.replace("+ p.damping * v", "* (1.0 if v > 0.0 else 0.5) + p.damping * v")
+    each = each.replace('title="Smooth', 'odd=False, title="Smooth')
+    file = Path(tmp_path) / "each_way.py"
+    file.write_text(each, encoding="utf-8")
+    model = Model(plugins.law_in(str(file), file.read_bytes()), fs=0.8, fc=0.5, slow=0.1, damping=0.02)
+    coulomb = laws_of(model)["coulomb"].parameters
+    assert (coulomb.fc, coulomb.fc_negative) == pytest.approx((0.5, 0.25), rel=0.01)
+
+
 def test_a_curve_that_never_changes_has_a_scale():
     flat = Model(
         "lugre",
@@ -210,7 +221,9 @@ def test_a_curve_that_never_changes_has_a_scale():
 
 
 def test_what_has_no_friction_at_rest_is_refused():
-    with pytest.raises(ParameterError, match="law 'viscous' has no friction at rest to compensate"):
+    assert levels_of(Model("viscous", sigma2=0.02))[:2] == (0.0, 0.0)
+    none = r"law 'viscous' has no friction at rest to compensate \(static 0 N·m, Coulomb 0 N·m\)"
+    with pytest.raises(ParameterError, match=none):
         believed(Model("viscous", sigma2=0.02), INERTIA)
     with pytest.raises(ParameterError, match="law 'armstrong' has no torque at constant velocity"):
         believed(Model("armstrong", **dict(plugins.law("armstrong").example)), INERTIA)

@@ -34,7 +34,7 @@ class Job:
     top_speed : float or None
         Greatest velocity of the application, rad/s: up to it sliding curves are compared and tables made. None: 100
         times the velocity over which the law changes: that of its `velocity_scale`, or, of a law that does not tell
-        it, the one at which its sliding curve bends.
+        it, the fastest at which its sliding curve bends.
     settings : mapping
         Values of the target's own settings by name (`Target.settings`); what is not given has the default.
     """

@@ -246,7 +246,7 @@ def laws_of(model: Model) -> dict[str, Model]:
     (level, slope), (back, falling) = (line_beyond(model, d) for d in (1.0, -1.0))
     if level <= 0.0 or back <= 0.0:
         return laws
-    if model.law.chosen.get("symmetry") != "asymmetric":
+    if model.law.odd:
         laws["coulomb"] = Model("coulomb", fc=level, sigma2=slope)
         return laws
     each = {"fc": level, "sigma2": slope, "fc_negative": back, "sigma2_negative": falling}
