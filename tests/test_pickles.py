@@ -7,7 +7,8 @@ import dataclasses
 import pickle
 import subprocess
 import sys
-from concurrent.futures import ProcessPoolExecutor
+import threading
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -18,6 +19,7 @@ import pytest
 
 import stickslip as ss
 from stickslip import errors, plugins
+from stickslip.laws import gms
 from stickslip.laws.gms import LAW as RAW
 from support.laws import registered, variants
 
@@ -265,3 +267,47 @@ def test_errors_come_back_from_a_worker() -> None:
         assert type(there) is type(error)
         assert str(there) == str(error)
         assert vars(there) == vars(error)
+
+
+def test_options_of_a_raw_law_are_those_of_its_family() -> None:
+    """They were a second family, whose law without options had no way back."""
+    literal = RAW.having(slip_rule="literal")
+    model = ss.Model(literal, **GMS)
+    assert model == ss.Model("gms", {"slip_rule": "literal"}, **GMS)
+    assert model.law.having(slip_rule="signed") is ss.law("gms")
+    assert pickle.loads(pickle.dumps(model)) == model
+
+
+def test_a_file_may_end_in_a_law_with_options(tmp_path: Path) -> None:
+    """Another process finds it with its options, and without them."""
+    file = tmp_path / "literal.py"
+    body = Path(gms.__file__).read_text(encoding="utf-8")
+    file.write_text(f'{body}\nLAW = LAW.having(slip_rule="literal")\n', encoding="utf-8")
+    law = ss.law(str(file))
+    assert law.option_of("slip_rule") == "literal"
+    for found in (law, law.having(slip_rule="signed")):
+        find, arguments = found.variants[()].home
+        assert find(*arguments) is found.variants[()]
+        assert arguments[0] == str(file)
+        assert pickle.loads(pickle.dumps(found)) is found
+
+
+def test_threads_get_one_law(tmp_path: Path) -> None:
+    file = tmp_path / "rooted.py"
+    file.write_text(OWN_LAW, encoding="utf-8")
+    together = threading.Barrier(4)
+
+    def found(_: int) -> object:
+        together.wait()
+        return ss.law(str(file))
+
+    with ThreadPoolExecutor(4) as pool:
+        assert len(set(pool.map(found, range(4)))) == 1
+
+
+def test_a_name_too_long_for_a_file_is_unknown() -> None:
+    for make in (ss.Model, ss.ControlBlock):
+        with pytest.raises(errors.UnknownName):
+            make("x" * 300)
+        with pytest.raises(errors.LawError):
+            make("x" * 300 + ".py")

@@ -8,6 +8,7 @@ from typing import Annotated, NamedTuple
 
 import pytest
 
+import stickslip as ss
 from stickslip.errors import LawError
 from stickslip.spec import Field, Par
 from stickslip.subset import Layout, lower, named
@@ -285,3 +286,25 @@ def test_a_number_may_be_called_as_a_structure_is():
     exec("\n".join(ast.unparse(f) for f in functions.values()), scope)
     p, z = Bag(a=2.0, b=0.5), Bag(x=0.3)
     assert of_numbers(0.7, z, p) == scope["of_numbers"](0.7, [0.3], [2.0, 0.5, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("above", [0, 40])
+def test_what_a_laws_file_makes_with_exec_is_not_taken_for_its_lines(tmp_path, above):
+    """The lines of the file with the same numbers were compiled in its place, or there were none."""
+    text = """
+from typing import Annotated, NamedTuple
+from stickslip.spec import Law, Par
+class Params(NamedTuple):
+    fc: Annotated[float, Par("N·m", "F_C", "level", positive=True)]
+def step(v0, v1, dt, z, p, u):
+    return p.fc * v1
+made = {**globals()}
+exec(ABOVE * "\\n" + "def step(v0, v1, dt, z, p, u):\\n    return 2.0 * p.fc * v1", made)
+LAW = Law("made", Params, made["step"], title="t", equation="F", source=(), example={"fc": 1.0})
+"""
+    file = tmp_path / "made.py"
+    file.write_text(text.replace("ABOVE", str(above or 5)), encoding="utf-8")
+    with pytest.raises(
+        LawError, match="the source of 'step' cannot be read; write the law in a file of its own"
+    ):
+        ss.law(str(file))

@@ -14,11 +14,12 @@ import importlib
 import importlib.util
 import os
 import sys
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 from stickslip import approval, trial
 from stickslip.arguments import arguments_checked
@@ -26,6 +27,23 @@ from stickslip.errors import InputError, LawError, UnknownName, suggestion
 from stickslip.origin import TEXT
 from stickslip.spec import COMPILED, Law, ReferenceKind
 from stickslip.subset import law_layouts, lower
+
+P = ParamSpec("P")
+T = TypeVar("T")
+_looking_up = threading.RLock()
+"""Held while a law is made: one lock, since looking one up may look up others."""
+
+
+def made_once(make: Callable[P, T]) -> Callable[P, T]:
+    """`functools.cache` that gives every thread the same object: laws are equal where they are the same one."""
+    kept = functools.cache(make)
+
+    @functools.wraps(make)
+    def once(*args: P.args, **kwargs: P.kwargs) -> T:
+        with _looking_up:
+            return kept(*args, **kwargs)
+
+    return once
 
 
 def law_names() -> tuple[str, ...]:
@@ -63,7 +81,7 @@ def law(name: str, named_by: str = "") -> Law:
 def unknown_law(family: str, name: str, known: Sequence[str]) -> UnknownName:
     """The error of a law's name that nobody knows; the name of a file of one's own has its ending."""
     file = f"{name}.py"
-    if Path(file).is_file():
+    if os.path.isfile(file):  # `Path.is_file` raises of a name that is too long for a file
         return UnknownName(family, name, (*known, file), file)
     if suggestion(name, known).startswith("did you mean"):
         return UnknownName(family, name, known)
@@ -71,16 +89,19 @@ def unknown_law(family: str, name: str, known: Sequence[str]) -> UnknownName:
     return UnknownName(family, name, known, further=hint)
 
 
-@functools.cache
+@made_once
 def completed(law: Law) -> Law:
     """The law with the choices that any law has: other parameters for v < 0, modulations."""
+    plain = law.variants.get((), law)
+    if plain is not law:  # Its options are those of the one family, in which equal options are one law.
+        return completed(plain).having(**law.chosen)
     places = [name.split(".") for name in importlib.import_module("stickslip.laws").COMMON_CHOICES]
     common = [getattr(importlib.import_module(f"stickslip.laws.{module}"), name) for module, name in places]
     made = law.offering(common)
     return made if made is law else made.coming_from(completed, law)
 
 
-@functools.cache
+@made_once
 def defined_in(path: str, code: bytes) -> ModuleType:
     """The module of a file, run once: its law is one object, however often it is asked for."""
     return module_of(path, code)
@@ -120,17 +141,29 @@ def _from_files() -> dict[str, Law]:
     return {found.name: found for found in laws}
 
 
-@functools.cache
+@made_once
 def law_in(path: str, code: bytes) -> Law:
     """The friction law in a file of this content, which the file may not have any more; `LawError` if there is none, or
     it is wrong."""
     found = getattr(defined_in(path, code), "LAW", None)
     if not isinstance(found, Law):
         raise LawError(f"{path} defines no law; end it with `LAW = Law(...)`")
-    return _tried(found, path).coming_from(law_in, path, code, path=path)
+    made = _tried(found, path)
+    plain: Law = made.variants.get((), made)
+    if plain is made:
+        return made.coming_from(law_in, path, code, path=path)
+    if plain.Params.__module__ == defined_in(path, code).__name__:
+        plain.coming_from(_without_options, path, code, path=path)
+    return made
 
 
-@functools.cache
+def _without_options(path: str, code: bytes) -> Law:
+    """What `law_in` finds in a file whose law has options, with none of them."""
+    made = law_in(path, code)
+    return made.variants.get((), made)
+
+
+@made_once
 def _tried(law: Law, origin: str) -> Law:
     """A law from outside, with the choices that any law has: read in the scalar subset, and tried for some steps."""
     lower({n: getattr(law, n) for n in COMPILED if getattr(law, n)}, law_layouts(law))

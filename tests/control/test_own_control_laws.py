@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 import stickslip as ss
 from stickslip.analyse.controller_loop import linearised
 from stickslip.errors import Divergence, InputError, LawError
+from stickslip.study.build import Numerics
+from stickslip.study.planned_run import PlannedRun
+from stickslip.sweep.block import measured
 
 HEAD = '''"""A law of one's own."""
 import math
@@ -195,3 +200,19 @@ def test_no_torque_at_rest_is_no_linear_loop(block):
         linearised(controller(block("return y.error / y.velocity")), 1e-6, 100.0)
     with pytest.raises(InputError, match="gives a torque that is no finite number at rest"):
         linearised(controller(block("return y.error * math.inf")), 1e-6, 100.0)
+
+
+def test_a_helper_that_was_edited_is_read_again(block):
+    """The law's own lines are the same."""
+    inner = "def sample(y, z, p, u):\n    return helped(y.error)\n\n\ndef helped(e):\n"
+    block("return 2.0 * e", sample=inner)
+    with pytest.raises(LawError, match=r"own.py, line .*`Try` is outside the scalar subset"):
+        block("try:\n    return e\nexcept ValueError:\n    return 0.0", sample=inner)
+
+
+def test_a_sweep_names_the_controller_that_gives_no_number(block):
+    """Its reason was empty."""
+    loop = controller(block("return p.kp * math.sqrt(-y.reference)"))
+    run = PlannedRun("own", "sine", "coulomb", "own", AXIS, loop, SINE, 0.1, Numerics())
+    (said,) = measured(run, {}, ["position_rms_rad"], 1).failures
+    assert re.match(r"ended at \S+ s: the loop 'own' gave no finite number in sample", said)

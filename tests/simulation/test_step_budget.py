@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError, ModelRemark, StepFailure
 from stickslip.simulation.adaptive import engine as adaptive
-from stickslip.simulation.case_arrays import TOO_STIFF, StepBudget
+from stickslip.simulation.case_arrays import COLUMNS, NO_STEP, TOO_STIFF, Case, Outcome, StepBudget
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
+from stickslip.simulation.sampled import engine as sampled
+from stickslip.study.build import Numerics
+from stickslip.study.planned_run import PlannedRun
+from stickslip.sweep.block import checked, measured
 
 LUGRE = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}
 PD = ss.Controller(ss.place("PD", 4e-4, 10.0, 1.0))
@@ -114,3 +119,50 @@ def test_fixed_steps_that_were_asked_for_are_no_surprise(recwarn):
         ModelRemark, match=r"slows the axis down at 9e\+07 /s\); compare with a tenth of the time_step"
     ):
         ss.simulate(steep, PD, motion, 0.05)
+
+
+def no_step(case: Case, *step: float) -> Outcome:
+    """An integrator that finds none."""
+    rows = np.zeros((1, len(COLUMNS)))
+    return Outcome(rows=rows, code=NO_STEP, time=0.01, meter=None, turns=None, counts={"steps": 1})
+
+
+def planned(axis, controller, reference, **numerics: float) -> PlannedRun:
+    return PlannedRun("own", "sine", "lugre", "PD", axis, controller, reference, 0.2, Numerics(**numerics))
+
+
+def test_a_sampled_run_without_a_step_keeps_its_record(monkeypatch):
+    """It was "no integrator can run this", which ended a whole study."""
+    axis, _, reference = loop(4e-4, 1.0)
+    controller = ss.Controller(ss.place("PD", 4e-4, 10.0, 1.0), sample_time=1e-3)
+    monkeypatch.setattr(sampled, "run", no_step)
+    with pytest.raises(
+        StepFailure, match=r"ended at 0.01 s: no step .* try a tolerance above 1e-09 rad$"
+    ) as caught:
+        ss.simulate(axis, controller, reference, 0.2)
+    assert len(caught.value.record) == 1
+    assert "the controller is sampled" in caught.value.record.meta["refused"]["fixed"]
+    assert "no step" in planned(axis, controller, reference).execute().failure
+
+
+def test_a_time_step_of_no_use_loses_no_record_and_what_ran_is_not_advised(monkeypatch):
+    for module in (exact, adaptive):
+        monkeypatch.setattr(module, "run", no_step)
+    with pytest.raises(StepFailure, match=r"1e-09 rad, or a longer time_step, with which fixed steps end$"):
+        ss.simulate(*loop(4e-4, 1.0), 0.2, time_step=1e-12)
+    assert "no step" in planned(*loop(4e-4, 1.0), time_step=1e-12).execute().failure
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_a_sweep_goes_on_with_the_next_integrator_too(together, monkeypatch):
+    """Whose error is that of its own worse run."""
+    monkeypatch.setattr(exact, "STEPS", StepBudget(10.0, 0.0, 0.0))
+    run = planned(*loop(4e-4, 1.0))
+    values = {"friction.fs": np.array([0.335])} if together else {}
+    metrics = ["position_rms_rad"]
+    found = measured(run, values, metrics, 1)
+    assert found.integrators == ["adaptive"]
+    best, flagged = checked(run, values, metrics, found)
+    assert best.integrators == ["adaptive"]
+    assert np.isfinite(best.metrics).all()
+    assert not flagged.any()

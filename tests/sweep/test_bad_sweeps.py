@@ -1,15 +1,17 @@
 """Bad sweeps: told before anything runs."""
 
+import pickle
 import re
 
 import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import ConfigError
+from stickslip.errors import ConfigError, InputError, LawError
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.model_file import write_model
 from stickslip.model import Model
+from stickslip.sweep import execute
 from stickslip.sweep.plan import load
 from support.sweeps import SMALL
 
@@ -88,3 +90,33 @@ def test_no_jobs_are_refused(tmp_path, capsys, jobs):
     assert not out.exists()
     assert main(["rerun", str(tmp_path), "--jobs", jobs]) == 2
     assert f"--jobs {jobs} must be at least 1" in capsys.readouterr().err
+
+
+class Unreadable:
+    """What raises when it is unpacked."""
+
+    def __init__(self, error):
+        self.error = error
+
+    def __reduce__(self):
+        return _raised, (self.error,)
+
+
+def _raised(error):
+    raise error
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (LawError("x.py cannot be imported: no module"), "cannot read the sweep: x.py cannot be imported"),
+        (
+            NotImplementedError("PosixPath"),
+            "the same version of stickslip there, under the same operating system",
+        ),
+        (ValueError("parts"), "would compute other numbers: install the same version"),
+    ],
+)
+def test_a_worker_says_why_it_cannot_read_a_sweep(error, said):
+    with pytest.raises(InputError, match=rf"^a worker on .* {said}"):
+        execute.Parcel(pickle.dumps(Unreadable(error)), ()).load()

@@ -76,8 +76,8 @@ class ControlBlock:
         choices: Mapping[str, str] | None = None,
         **parameters: Any,
     ) -> None:
-        found = control_law(law) if isinstance(law, str) else read(law)
-        self.law: ControlLaw = found.having(**choices) if choices else found
+        found = control_law(law) if isinstance(law, str) else law
+        self.law: ControlLaw = read(found.having(**choices) if choices else found)
         if self.law.holds_friction and friction is None:
             raise ParameterError(f"{self.law.name}: needs a friction law; give friction=Model(...)")
         if friction is not None and not self.law.holds_friction:

@@ -11,6 +11,7 @@ from typing import Any
 
 from stickslip.control_spec import ControlLaw, Signals
 from stickslip.errors import LawError
+from stickslip.origin import TEXT
 from stickslip.spec import Surroundings, fields_of
 from stickslip.subset import Layout, lower
 from stickslip.subset.layout import INPUT, PARAMETER, SURROUNDINGS
@@ -42,8 +43,12 @@ def read(law: ControlLaw) -> ControlLaw:
     if str(getattr(law.written["sample"], "__module__", "")).startswith(OURS):
         return law
     # By their texts: with other sines in the place of `math`'s, as its contract tries it, a law is the same.
-    texts = [getattr(f, "__code__", f) for f in (*(getattr(law, n) for n in TAKES), *law.deviations.values())]
-    key = (*texts, *((f.name, f.per_element) for f in (*law.fields, *law.state_fields)))
+    functions = [*(getattr(law, n) for n in TAKES), *law.deviations.values(), *law.option_scope().values()]
+    # Of a file its whole text, which holds what the functions call.
+    files = {getattr(f, "__globals__", {}).get(TEXT) for f in functions}
+    texts = [getattr(f, "__code__", f) for f in functions]
+    fields = ((f.name, f.per_element) for f in (*law.fields, *law.state_fields))
+    key = (frozenset(files), *texts, *fields, law.holds_friction)
     if key not in _read:
         insist_on_subset(law)
         _read.add(key)

@@ -6,7 +6,6 @@ come from installed packages (entry point ``stickslip.control_laws``), or from a
 
 from __future__ import annotations
 
-import functools
 import importlib
 from pathlib import Path
 
@@ -75,7 +74,7 @@ def law_files(table: Table) -> dict[str, Law | ControlLaw]:
     return found
 
 
-@functools.cache
+@plugins.made_once
 def _control_law_in(path: str, code: bytes) -> ControlLaw:
     found = getattr(plugins.defined_in(path, code), "CONTROL_LAW", None)
     if not isinstance(found, ControlLaw):

@@ -144,7 +144,8 @@ def run_case(
     With `start` alone, only the dependence on the start is looked at, where the exact integrator runs the case: that
     costs a tenth of the run.
     """
-    name, outcome, refused = integrated(case, integrator, time_step)
+    ran = integrated(case, integrator, time_step)
+    name, outcome, refused = ran
     how: dict[str, Any] = {"integrator": name, "slip_rule": slip_rule}
     if refused:
         how["refused"] = dict(refused)
@@ -164,7 +165,7 @@ def run_case(
         how["accuracy"] = {"start_rad": apart, "depends_on_start": accuracy.branches(apart)}
     record = _record(case, outcome, how)
     if outcome.code != case_arrays.DONE:
-        kind, why = reason(case, name, outcome)
+        kind, why = reason(case, ran)
         raise kind(f"the run ended at {outcome.time:.6g} s: {why}", outcome.time, record)
     return record
 

@@ -46,7 +46,7 @@ REASONS: dict[int, tuple[type[SimulationError], str]] = {
         "a part of the motion is so fast that its metrics take more than a million nodes of a single step; lower "
         "the controller's gains or bandwidth, or raise the inertia",
     ),
-    case_arrays.NO_TORQUE: (Divergence, ""),
+    case_arrays.NO_TORQUE: (Divergence, "the controller gave no finite number"),
 }
 
 
@@ -58,9 +58,8 @@ class Choice(NamedTuple):
     refused: Mapping[str, str]
 
 
-def integrator_for(case: Case, name: str = "auto", without: Mapping[str, str] | None = None) -> Choice:
-    """That integrator, or the first that can run the case, those left out that `without` gives a reason against;
-    `InputError` if none can."""
+def integrator_for(case: Case, name: str = "auto") -> Choice:
+    """That integrator, or the first that can run the case; `InputError` if none can."""
     if name != "auto":
         if name not in INTEGRATORS:
             raise UnknownName("integrator", name, (*INTEGRATORS, "auto"))
@@ -68,20 +67,28 @@ def integrator_for(case: Case, name: str = "auto", without: Mapping[str, str] | 
         if why := module.can_run(case):
             raise InputError(f"the {name} integrator cannot run this: {why}")
         return Choice(name, module.run, {})
-    refused: dict[str, str] = dict(without or {})
-    for candidate in (c for c in INTEGRATORS if c not in refused):
-        module = importlib.import_module(f"stickslip.simulation.{candidate}.engine")
-        why = module.can_run(case)
-        if not why:
-            return Choice(candidate, module.run, refused)
-        refused[candidate] = why
+    refused: dict[str, str] = {}
+    if found := _first(case, refused):
+        return found
     raise InputError(
         "no integrator can run this (" + "; ".join(f"{k}: {why}" for k, why in refused.items()) + ")"
     )
 
 
+def _first(case: Case, refused: dict[str, str]) -> Choice | None:
+    """The first integrator that is not `refused` and can run the case; those before it are added with what they say."""
+    for candidate in (c for c in INTEGRATORS if c not in refused):
+        module = importlib.import_module(f"stickslip.simulation.{candidate}.engine")
+        why = module.can_run(case)
+        if not why:
+            return Choice(candidate, module.run, dict(refused))
+        refused[candidate] = why
+    return None
+
+
 class Integrated(NamedTuple):
-    """What ran a case, how it ended, and why not those that "auto" takes before it."""
+    """What ran a case, how it ended, and why not those that "auto" takes before it; where none came to the end, why not
+    the others."""
 
     name: str
     outcome: Outcome
@@ -93,18 +100,41 @@ def integrated(case: Case, integrator: str, time_step: float) -> Integrated:
 
     Where none comes to the end, the outcome is that of the one that came farthest.
     """
-    runs: list[Integrated] = []
-    refused: Mapping[str, str] = {}
-    while True:
-        name, run, refused = integrator_for(case, integrator, refused)
-        if name == "fixed":
-            insist_on_steps("time_step", time_step, float(case.numbers[case_arrays.DURATION]))
-        outcome: Outcome = run(case, time_step) if name == "fixed" else run(case)
-        runs.append(Integrated(name, outcome, refused))
-        if integrator != "auto" or outcome.code not in NO_STEPS or name == INTEGRATORS[-1]:
+    first = integrator_for(case, integrator)
+    if first.name == "fixed":
+        _insist_on_time_step(case, time_step)
+    runs = [_run(case, first, time_step)]
+    refused = dict(first.refused)
+    while integrator == "auto" and runs[-1].outcome.code in NO_STEPS:
+        refused[runs[-1].name] = _ended(runs[-1].outcome)
+        if (following := _first(case, refused)) is None:
             break
-        refused = {**refused, name: f"ended at {outcome.time:.6g} s: {REASONS[outcome.code][1]}"}
-    return runs[-1] if runs[-1].outcome.code == case_arrays.DONE else max(runs, key=lambda r: r.outcome.time)
+        if following.name == "fixed":
+            # By now there is a record, which a time_step that is of no use must not lose.
+            try:
+                _insist_on_time_step(case, time_step)
+            except ParameterError as error:
+                refused[following.name] = str(error)
+                break
+        runs.append(_run(case, following, time_step))
+    if runs[-1].outcome.code == case_arrays.DONE:
+        return runs[-1]
+    refused |= {r.name: _ended(r.outcome) for r in runs}
+    farthest = max(runs, key=lambda r: r.outcome.time)
+    return farthest._replace(refused={k: why for k, why in refused.items() if k != farthest.name})
+
+
+def _ended(outcome: Outcome) -> str:
+    return f"ended at {outcome.time:.6g} s: {REASONS[outcome.code][1]}"
+
+
+def _run(case: Case, choice: Choice, time_step: float) -> Integrated:
+    outcome: Outcome = choice.run(case, time_step) if choice.name == "fixed" else choice.run(case)
+    return Integrated(choice.name, outcome, choice.refused)
+
+
+def _insist_on_time_step(case: Case, time_step: float) -> None:
+    insist_on_steps("time_step", time_step, float(case.numbers[case_arrays.DURATION]))
 
 
 def without_tolerance(meta: Mapping[str, Any], time_step: float) -> str:
@@ -133,8 +163,9 @@ def insist_on_steps(name: str, step: float, duration: float) -> None:
         )
 
 
-def reason(case: Case, name: str, outcome: Outcome) -> tuple[type[SimulationError], str]:
-    """The error of a run that ended early, and why it did, with what to try."""
+def reason(case: Case, ran: Integrated) -> tuple[type[SimulationError], str]:
+    """The error of a run that ended early, and why it did, with what to try that was not tried."""
+    name, outcome, refused = ran
     kind, why = REASONS[outcome.code]
     if outcome.code == case_arrays.TOO_STIFF:
         why += _in_numbers(case, outcome)
@@ -145,8 +176,11 @@ def reason(case: Case, name: str, outcome: Outcome) -> tuple[type[SimulationErro
         return kind, why
     remedies = [f"a tolerance above {case.numbers[case_arrays.TOLERANCE]:g} rad"]
     if case.numbers[case_arrays.SAMPLE_TIME] == 0.0:
-        remedies += ['integrator="adaptive"'] if name == "exact" else []
-        remedies.append("or use the fixed integrator")
+        remedies += ['integrator="adaptive"'] if name == "exact" and "adaptive" not in refused else []
+        if "fixed" not in refused:
+            remedies.append("or use the fixed integrator")
+        elif "time_step" in refused["fixed"]:
+            remedies.append("or a longer time_step, with which fixed steps end")
     return kind, f"{why}; try {', '.join(remedies)}"
 
 

@@ -6,6 +6,7 @@ import ast
 import functools
 import inspect
 import textwrap
+import tokenize
 import types
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +16,8 @@ from typing import Any
 from stickslip.errors import LawError
 from stickslip.origin import TEXT
 
+UNREADABLE = (AttributeError, IndexError, OSError, SyntaxError, TypeError, tokenize.TokenError)
+"""What Python raises of code whose text is elsewhere, or another one."""
 VARIADIC = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
 
 
@@ -30,13 +33,17 @@ class Place:
 def source_of(function: Callable[..., Any]) -> tuple[str, Place]:
     """The text of a function and where it stands."""
     try:
-        code = function.__code__
-        return _source_of(code, code.co_filename, function.__globals__.get(TEXT))
-    except (AttributeError, OSError, TypeError) as error:
-        name = getattr(function, "__name__", str(function))
-        raise LawError(
-            f"the source of {name!r} cannot be read; write the law in a file of its own"
-        ) from error
+        code, around = function.__code__, function.__globals__
+        # Only of what stands in the file: code that the file makes with `exec` has lines of its own.
+        text = around.get(TEXT) if code.co_filename == around.get("__file__") else None
+        return _source_of(code, code.co_filename, text)
+    except UNREADABLE as error:
+        raise _unreadable(function) from error
+
+
+def _unreadable(function: Callable[..., Any]) -> LawError:
+    name = getattr(function, "__name__", str(function))
+    return LawError(f"the source of {name!r} cannot be read; write the law in a file of its own")
 
 
 @functools.lru_cache(maxsize=4096)
@@ -63,7 +70,12 @@ def arguments_of(function: Callable[..., Any]) -> tuple[str, ...]:
 def parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, Place]:
     """The tree of a function, for the caller to change, and where it stands."""
     text, where = source_of(function)
-    tree = ast.parse(text).body[0]
+    try:
+        tree = ast.parse(text).body[0]
+    except UNREADABLE as error:
+        raise _unreadable(function) from error
     if not isinstance(tree, ast.FunctionDef):
         raise LawError(f"{where.at(tree)}: a law's function is a `def`; write it as one")
+    if tree.name != function.__code__.co_name:  # Its lines hold something else by now.
+        raise _unreadable(function)
     return tree, where

@@ -15,7 +15,15 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.simulation import case_arrays
 from stickslip.simulation.accuracy import LOOSER, PERTURBATIONS
 from stickslip.simulation.closed_loop import prepare
-from stickslip.simulation.integrators import REASONS, integrator_for
+from stickslip.simulation.integrators import (
+    INTEGRATORS,
+    NO_STEPS,
+    REASONS,
+    Integrated,
+    integrated,
+    integrator_for,
+    reason,
+)
 from stickslip.simulation.machine.layout import TOLERANCE
 from stickslip.simulation.machine.loop import simulate_machine
 from stickslip.simulation.many import batch, simd_batch
@@ -123,15 +131,21 @@ def checked(
     best = Measured(found.metrics.copy(), list(found.failures), list(found.integrators))
     flagged = np.zeros(len(best.metrics), dtype=np.bool_)
 
-    def again(cases: Any, times: float, perturbation: float = 0.0) -> Measured:
+    def again(cases: Any, times: float, perturbation: float = 0.0, integrator: str = "") -> Measured:
         n = planned.numerics
         # The fixed integrator is of second order in its step.
-        finer = replace(n, tolerance=times * n.tolerance, time_step=math.sqrt(times) * n.time_step)
+        finer = replace(
+            n, tolerance=times * n.tolerance, time_step=math.sqrt(times) * n.time_step,
+            integrator=integrator if integrator in INTEGRATORS else n.integrator,
+        )  # fmt: skip
         some = {k: v[cases] for k, v in values.items()}
         return measured(replace(planned, numerics=finer), some, metrics, len(cases), perturbation)
 
     def differs(cases: Any, other: Measured, part: float) -> Any:
-        ends = np.array([best.failures[i] != why for i, why in zip(cases, other.failures)], dtype=np.bool_)
+        ends = np.array(
+            [_when(best.failures[int(i)]) != _when(why) for i, why in zip(cases, other.failures)],
+            dtype=np.bool_,
+        )
         return differ(best.metrics[cases], other.metrics, metrics, planned.duration, part) | ends
 
     def perturbed(cases: Any, times: float) -> None:
@@ -142,8 +156,11 @@ def checked(
                 if perturbation == PERTURBATIONS[0]
                 else cases[[best.integrators[i] == "exact" for i in cases]]
             )
-            if some.size:
-                flagged[some] |= differs(some, again(some, times, perturbation), SETTLED)
+            # What is held against a run is one of the integrator that ran it.
+            ran: list[str] = [best.integrators[i] for i in some]
+            for name in dict.fromkeys(ran):
+                same = some[[best.integrators[i] == name for i in some]]
+                flagged[same] |= differs(same, again(same, times, perturbation, name), SETTLED)
 
     perturbed(np.arange(len(flagged)), 1.0)
     unmoved = np.flatnonzero(~flagged)
@@ -157,8 +174,8 @@ def checked(
         fine = again(cases, times)
         flagged[cases] = differs(cases, fine, SURE)
         best.metrics[cases] = fine.metrics
-        for i, why in zip(cases, fine.failures):
-            best.failures[i] = why
+        for i, why, name in zip(cases, fine.failures, fine.integrators):
+            best.failures[i], best.integrators[i] = why, name
         perturbed(cases, times)
     return best, flagged
 
@@ -199,14 +216,19 @@ def measured(
     """
     many = _as_batch(planned, values)
     if many is None:
-        rows = [
-            _alone(planned, {k: v[i].tolist() for k, v in values.items()}, metrics, perturbation)
-            for i in range(n)
-        ]
-        found = np.array([row for row, *_ in rows]).reshape(n, len(metrics))
-        return Measured(found, [why for _, why, _ in rows], [name for *_, name in rows])
-    many.parameters[:, case_arrays.PERTURBATION] = perturbation
-    return _read(many.run(metrics), metrics, "exact")
+        found = Measured(np.full((n, len(metrics)), np.nan), [""] * n, [""] * n)
+        left = range(n)
+    else:
+        many.parameters[:, case_arrays.PERTURBATION] = perturbation
+        results = many.run(metrics)
+        found = _read(results, metrics, "exact")
+        goes_on = planned.numerics.integrator == "auto" and perturbation == 0.0
+        left = [i for i in range(n) if goes_on and results.codes[i] in NO_STEPS]
+    for i in left:
+        found.metrics[i], found.failures[i], found.integrators[i] = _alone(
+            planned, {k: v[i].tolist() for k, v in values.items()}, metrics, perturbation
+        )
+    return found
 
 
 def _read(results: batch.Results, metrics: Sequence[str], integrator: str) -> Measured:
@@ -241,6 +263,11 @@ def as_lanes(planned: PlannedRun, values: Mapping[str, Array], step: float) -> s
         return simd_batch.prepare(_laid_out(planned), as_columns(planned, values), step)
     except InputError:
         return None
+
+
+def _when(failure: str) -> str:
+    """What is said of a failure before its reason, whose numbers follow the tolerance."""
+    return failure.split(": ")[0]
 
 
 def _reason(code: int, time: float) -> str:
@@ -280,21 +307,27 @@ def _alone(
         if isinstance(run.axis, Machine):
             return _on_machine(run, run.axis, metrics, FINER * TOLERANCE if perturbation else TOLERANCE)
         case = _laid_out(run)
-        name, integrate, _ = integrator_for(case, run.numerics.integrator)
+        ran = _integrated(case, run.numerics.integrator, run.numerics.time_step, perturbation)
     except ParameterError as error:
         return none, str(error), ""
-    step = run.numerics.time_step
+    if ran.outcome.code != case_arrays.DONE:
+        return none, f"ended at {ran.outcome.time:.6g} s: {reason(case, ran)[1]}", ran.name
+    found = read_meter(ran.outcome.meter, ran.outcome.turns)
+    return [found[name] for name in metrics], "", ran.name
+
+
+def _integrated(case: case_arrays.Case, integrator: str, step: float, perturbation: float) -> Integrated:
+    """Run a case; less exact, with the first integrator alone, where there is a perturbation."""
+    if perturbation == 0.0:
+        return integrated(case, integrator, step)
+    name = integrator_for(case, integrator).name
     # Only the exact integrator reads the perturbation: without more the others would agree with themselves.
     if name == "exact":
         case.numbers[case_arrays.PERTURBATION] = perturbation
-    elif perturbation != 0.0:
+    else:
         case.numbers[case_arrays.TOLERANCE] *= LOOSER.get(name, 1.0)
         step *= LONGER
-    outcome = integrate(case, step) if name == "fixed" else integrate(case)
-    if outcome.code != case_arrays.DONE:
-        return none, _reason(outcome.code, outcome.time), name
-    found = read_meter(outcome.meter, outcome.turns)
-    return [found[name] for name in metrics], "", name
+    return integrated(case, name, step)
 
 
 def _on_machine(

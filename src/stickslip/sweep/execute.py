@@ -31,6 +31,15 @@ ADDRESS = re.compile(r"(?:[a-z]+://)?(?:[^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):\d{1,5}
 """Of a Dask scheduler: its client looks for another kind of text in vain, and for long."""
 PATIENCE = 10.0
 """s that a scheduler has to answer."""
+OTHER_PARTS = (
+    AttributeError,
+    ImportError,
+    NotImplementedError,
+    TypeError,
+    ValueError,
+    pickle.UnpicklingError,
+)
+"""What a pickle raises where another version of the package has other parts, or another system other paths"""
 MOST_TRIES = 5
 """So often workers may be killed before the command gives up; what is done is kept."""
 Progress = Callable[[int, int], None]
@@ -270,15 +279,19 @@ class Parcel:
         Raises
         ------
         InputError
-            If another version of this package runs here.
+            If another version of this package runs here, or a law of the sweep cannot be had here.
         """
-        # Another version has other parts.
-        with suppress(AttributeError, ImportError, TypeError, InputError):
+        try:
             sweep: Sweep = pickle.loads(self.sweep)
             if fingerprints(sweep) == self.fingerprints:
                 return sweep
+        except InputError as error:
+            raise InputError(f"a worker on {platform.node()} cannot read the sweep: {error}") from None
+        except OTHER_PARTS:
+            pass
         raise InputError(
-            f"a worker on {platform.node()} would compute other numbers: install the same version of stickslip there"
+            f"a worker on {platform.node()} would compute other numbers: install the same version of stickslip there, "
+            "under the same operating system"
         )
 
 
