@@ -15,12 +15,14 @@ from pathlib import Path
 import cloudpickle
 import joblib
 import numpy as np
+import pandas
 import pytest
 
 import stickslip as ss
 from stickslip import errors, plugins
 from stickslip.laws import gms
 from stickslip.laws.gms import LAW as RAW
+from stickslip.simulation.machine.loop import rows_at
 from support.laws import registered, variants
 
 GMS = {"k": [1e4, 7e3], "alpha": [0.5, 0.5], "c": 24.0, "fs": 0.335, "fc": 0.285, "vs": 0.01}
@@ -311,3 +313,27 @@ def test_a_name_too_long_for_a_file_is_unknown() -> None:
             make("x" * 300)
         with pytest.raises(errors.LawError):
             make("x" * 300 + ".py")
+
+
+class Column:
+    """As of a data frame that has no `tolist`."""
+
+    shape = (2,)
+
+    def __iter__(self):
+        return iter([1e4, 7e3])
+
+
+def test_numbers_of_other_kinds() -> None:
+    """Columns, NumPy's numbers in what is printed and as a spacing, and what a record's meta may hold."""
+    assert ss.Model("gms", **{**GMS, "k": Column()}) == ss.Model("gms", **GMS)
+    assert "np." not in repr(ss.Controller(ss.Gains(np.float32(1.0), np.int64(1))))
+    axis, controller = usual()
+    whole = ss.simulate(axis, controller, SINE, DURATION, output=0.01)
+    machine = ss.load_machine("thesis-dry")
+    assert len(ss.simulate(axis, controller, SINE, DURATION, output=np.float32(0.01))) == len(whole)
+    assert len(ss.simulate(axis, controller, SINE, DURATION, output=np.int64(1))) >= 1
+    assert rows_at(np.float32(machine.sample_time), machine.sample_time, 0.1).size > 2
+    one, other = (dataclasses.replace(whole, meta={"n": pandas.Series([1.0, np.nan])}) for _ in range(2))
+    assert one == other
+    assert one != dataclasses.replace(whole, meta={"n": pandas.Series([1.0, 2.0])})

@@ -170,3 +170,13 @@ def test_a_table_takes_arrays_of_any_kind():
     lists = Reference.table([0, 1, 2], [0.0, 0.1, 0.3])
     assert Reference.table(np.arange(3), np.array([0.0, 0.1, 0.3])) == lists
     assert Reference.table(pandas.Series([0, 1, 2]), (0.0, 0.1, 0.3)) == lists
+
+
+def test_a_table_of_times_is_refused():
+    """Its rows were taken one after another without a word."""
+    sine = Reference("sine", amplitude=0.1, frequency=1.0)
+    assert sine.sample([0.1]).shape == (1, 3)
+    with pytest.raises(
+        ParameterError, match=r"time has the shape \(2, 3\); give the times one after another"
+    ):
+        sine.sample(np.zeros((2, 3)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 import warnings
 
 import pytest
@@ -130,3 +132,12 @@ def test_a_file_says_it_too(tmp_path, capsys):
 def test_what_has_no_meaning_is_refused(make, said):
     with pytest.raises(ParameterError, match=said):
         make()
+
+
+@pytest.mark.parametrize("change", [dataclasses.replace, getattr(copy, "replace", dataclasses.replace)])
+def test_a_changed_controller_is_remarked_upon_where_it_is_changed(change):
+    """It was in dataclasses.py."""
+    usual = Controller(Gains(10.0, 0.1), sample_time=1e-3)
+    with pytest.warns(ModelRemark, match="slow for a drive") as said:
+        change(usual, sample_time=1.0)
+    assert [w.filename for w in said] == [__file__]

@@ -4,7 +4,8 @@ A law or rig that the user names (``Model("my_law.py")``, ``--law my_law.py``, S
 TOML file names (``law = "x.py"``, ``plugins``, ``kind = "x.py"``) may come from somebody else: it runs inside
 `allow_code`, with ``--allow-code`` on the command line, or if this user ran the same bytes before. The command line
 remembers their SHA-256 in the file ``approved`` of the folder STICKSLIP_CONFIG, else the user's folder of settings.
-What the code itself imports is not looked at.
+What the code itself imports is not looked at. A pickle runs the text of a law's file that it holds without being asked,
+as every pickle may run code: unpickle only what comes from somebody whose code you would run.
 """
 
 from __future__ import annotations

@@ -60,7 +60,8 @@ class Described(Findable):
                 raise ParameterError(
                     f"{self.name}: {f.name} has the shape {tuple(shape)}; give one number per {f.par.per}, shape (n,)"
                 )
-            value = value.tolist() if shape is not None else value
+            if shape is not None:
+                value = value.tolist() if hasattr(value, "tolist") else list(value)
             if isinstance(value, str) or not isinstance(value, Sequence):
                 raise ParameterError(
                     f"{self.name}: {f.name} = {value!r} must be a list, one number per {f.par.per}"

@@ -64,8 +64,8 @@ class Model:
         found = plugins.law(law) if isinstance(law, str) else plugins.completed(law)
         self.law: Law = found.having(**choices) if choices else found
         self.parameters: Any = self.law.parameters(parameters)
-        if (words := self.law.remark(self.parameters)) and not called_from_within():
-            warnings.warn(words, ModelRemark, stacklevel=3)
+        if (words := self.law.remark(self.parameters)) and (level := level_of_caller()):
+            warnings.warn(words, ModelRemark, stacklevel=level)
 
     @arguments_checked
     def warn(self, origin: str = "") -> Model:
@@ -172,14 +172,16 @@ def _model(law: Law, values: Mapping[str, Any]) -> Model:
     return Model(law, **values)
 
 
-def called_from_within() -> bool:
-    """Whether the package itself called the constructor that asks: a fit tries many models that nobody has written."""
-    frame = inspect.currentframe()
+def level_of_caller() -> int:
+    """The ``stacklevel`` of whoever called the constructor that asks, behind `dataclasses.replace` too; 0 where it was
+    the package itself: a fit tries many models that nobody has written."""
+    frame, level = inspect.currentframe(), 3
     for _ in range(3):  # this function, the constructor, what checks its arguments
         frame = frame.f_back if frame else None
-    while frame is not None and frame.f_globals.get("__name__") == "dataclasses":  # `replace`
-        frame = frame.f_back
-    return frame is not None and str(frame.f_globals.get("__name__", "")).startswith("stickslip.")
+    while frame is not None and frame.f_globals.get("__name__") in ("dataclasses", "copy"):  # their `replace`
+        frame, level = frame.f_back, level + 1
+    within = frame is not None and str(frame.f_globals.get("__name__", "")).startswith("stickslip.")
+    return 0 if within else level
 
 
 def _times(factor: float, value: Any) -> Any:
@@ -249,12 +251,23 @@ class Reference:
 
     @arguments_checked
     def sample(self, time: Vector) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Position (rad), velocity (rad/s) and acceleration (rad/s²), shape (n, 3), at each `time` (s)."""
+        """Position (rad), velocity (rad/s) and acceleration (rad/s²), shape (n, 3), at each `time` (s), shape (n,).
+
+        Raises
+        ------
+        ParameterError
+            If the times are a table.
+        """
         from types import SimpleNamespace
 
         out = SimpleNamespace(position=0.0, velocity=0.0, acceleration=0.0)
         rows: list[tuple[float, float, float]] = []
-        for t in np.asarray(time, dtype=np.float64).reshape(-1).tolist():
+        times = np.asarray(time, dtype=np.float64)
+        if times.ndim > 1:
+            raise ParameterError(
+                f"reference: time has the shape {times.shape}; give the times one after another, shape (n,)"
+            )
+        for t in times.reshape(-1).tolist():
             self.kind.profile(t, self.parameters, out)
             rows.append((out.position, out.velocity, out.acceleration))
         return np.array(rows, dtype=np.float64).reshape(-1, 3)

@@ -23,7 +23,7 @@ def call_of(name: str, first: Sequence[object], named: Iterable[tuple[str, objec
 
 def text_of(value: object) -> str:
     """A value as code; NumPy's numbers as Python's."""
-    return repr(float(value)) if isinstance(value, float) else repr(value)
+    return repr(cast("Any", value).item()) if isinstance(value, np.generic) else repr(value)
 
 
 def making(thing: Any, standard: Mapping[str, object]) -> str:
@@ -48,7 +48,8 @@ def same(one: object, other: object) -> bool:
     if isinstance(one, (list, tuple)) and isinstance(other, (list, tuple)):
         x, y = cast("Sequence[Any]", one), cast("Sequence[Any]", other)
         return len(x) == len(y) and all(same(v, w) for v, w in zip(x, y))
-    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+    # Columns of a data frame are no arrays of NumPy.
+    if hasattr(cast("Any", one), "shape") or hasattr(cast("Any", other), "shape"):
         v, w = np.asarray(cast("Any", one)), np.asarray(cast("Any", other))
         return v.shape == w.shape and bool(np.all((v == w) | ((v != v) & (w != w))))
     return bool(one == other) or bool(one != one and other != other)

@@ -216,3 +216,44 @@ def test_a_sweep_names_the_controller_that_gives_no_number(block):
     run = PlannedRun("own", "sine", "coulomb", "own", AXIS, loop, SINE, 0.1, Numerics())
     (said,) = measured(run, {}, ["position_rms_rad"], 1).failures
     assert re.match(r"ended at \S+ s: the loop 'own' gave no finite number in sample", said)
+
+
+def test_an_option_outside_the_subset_is_refused_when_it_is_chosen(block, tmp_path):
+    """It was first refused when a controller was compiled."""
+    block("return y.error")
+    text = (tmp_path / "own.py").read_text()
+    before, after = text.split("def sample")
+    options = """
+from stickslip.spec import Choice, Option
+
+
+class Nothing(NamedTuple):
+    pass
+
+
+def shaped(e):
+    return e
+
+
+def steep(e):
+    try:
+        return 2.0 * e
+    except ValueError:
+        return 0.0
+
+
+"""
+    file = tmp_path / "chosen.py"
+    chosen = (
+        'choices=(Choice("shape", "shaped", {"flat": Option(function=shaped), '
+        '"steep": Option(function=steep)}, "flat"),), State=State'
+    )
+    file.write_text(
+        before
+        + options
+        + "def sample"
+        + after.replace("State=State", chosen).replace("y.error", "shaped(y.error)")
+    )
+    ss.ControlBlock(str(file), kp=10.0)
+    with pytest.raises(LawError, match=r"chosen.py, line .*`Try` is outside the scalar subset"):
+        ss.ControlBlock(str(file), choices={"shape": "steep"}, kp=10.0)

@@ -18,7 +18,7 @@ from stickslip.control.linear import Cascade, Gains
 from stickslip.control.short_form import laws_meant, refuse_short
 from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.errors import ModelRemark, ParameterError
-from stickslip.model import Model, called_from_within
+from stickslip.model import Model, level_of_caller
 from stickslip.values import making
 
 Blocks = ControlBlock | Sequence[ControlBlock] | None
@@ -114,8 +114,8 @@ class Controller(Composed):
         refuse_short(gains, compensator, velocity_filter, sample_time)
         if not self.is_short:
             self._refuse_laws()
-        if (words := self.remark) and not called_from_within():
-            warnings.warn(f"controller: {words}", ModelRemark, stacklevel=3)
+        if (words := self.remark) and (level := level_of_caller()):
+            warnings.warn(f"controller: {words}", ModelRemark, stacklevel=level)
 
     def _refuse_numbers(self) -> None:
         insist_on_own(self, "controller")

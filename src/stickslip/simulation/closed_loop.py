@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 import warnings
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.record import Record
+from stickslip.rules import is_number
 from stickslip.simulation import case_arrays
 from stickslip.simulation.case_arrays import COLUMNS, UNITS, Case, Outcome, lay_out, slip_rules
 from stickslip.simulation.integrators import insist_on_steps, integrated, reason, without_tolerance
@@ -244,7 +245,8 @@ def _insist_on_tolerance(tolerance: float) -> None:
 
 def _grid(output: float | Vector, duration: float) -> Any:
     """The times at which rows are wanted."""
-    if isinstance(output, (int, float)):
+    if is_number(output):
+        output = float(cast(float, output))
         if not (math.isfinite(output) and output > 0.0):
             raise ParameterError(f"simulate: output = {output:g} s must be greater than 0 and finite")
         ratio = duration / output * (1.0 + 1e-12)
@@ -254,7 +256,7 @@ def _grid(output: float | Vector, duration: float) -> Any:
                 f"simulate: output = {output:g} s gives {count:.3g} rows; use a larger spacing"
             )
         # Multiples of the spacing, not a running sum, so that the grid is what a person would write down.
-        return np.minimum(np.arange(count + 1) * float(output), duration)
+        return np.minimum(np.arange(count + 1) * output, duration)
     times = np.asarray(output, dtype=np.float64)
     if times.ndim != 1 or not np.all(np.isfinite(times)) or np.any(times[1:] < times[:-1]):
         raise ParameterError("simulate: output times must be finite and ascend")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from stickslip.jit import compiled_profile, flat
 from stickslip.machines.machine import Machine
 from stickslip.model import Reference
 from stickslip.record import Record
+from stickslip.rules import is_number
 from stickslip.simulation._meter import new_meter, turning_points
 from stickslip.simulation._nodes import SIGNALS
 from stickslip.simulation.case_arrays import ruled, ruled_in, slip_rules
@@ -163,7 +164,8 @@ def rows_at(
         If a time lies between samples.
     """
     last = math.floor(duration / sample_time * (1.0 + 1e-12))
-    if isinstance(output, (int, float)):
+    if is_number(output):
+        output = float(cast(float, output))
         every = max(1, round(output / sample_time))
         times = np.arange(0, last + 1, every)
         if abs(every * sample_time - output) > ON_TIME * sample_time and output > sample_time:
