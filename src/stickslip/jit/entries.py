@@ -225,7 +225,7 @@ def compile_entry(name: str) -> Callable[[Any], Any]:
     def decorate(function: Any) -> Any:
         signature = SIGNATURES[name]
         types_of = (signature.args, signature.return_type)
-        entry = cached(CFunc(function, types_of, {}, {"error_model": "numpy", "forceinline": True}), function)
+        entry = cached(CFunc(function, types_of, {}, {"error_model": "numpy"}), function)
         entry.compile()
         return entry
 
