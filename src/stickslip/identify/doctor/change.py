@@ -84,7 +84,7 @@ def changes(view: View) -> Iterator[Finding]:
 
 def _drifting(view: View) -> Iterator[Finding]:
     """Friction that drifts evenly with time, as certain sliding shows it, by more than a few percent."""
-    found = view.sliding
+    found = None if view.smooth is None else view.sliding  # times that are none make neither
     drift = None if found is None else drift_of(found.numbers, found.rows)
     if drift is None or abs(drift.share) < DRIFTS_BY:
         return
