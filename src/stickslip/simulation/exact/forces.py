@@ -9,6 +9,7 @@ S = F - G (theta - theta_0), S = F - B v. The division changes no result; nothin
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from stickslip.jit import call_profile, call_value, kernel, pointer
@@ -33,8 +34,8 @@ Torques = tuple[float, float, float]
 FLAT = 5.0
 """Velocity, in parts of v_s, above which the slope of s(v) is not worth its price."""
 STIFF = 0.01
-"""Least stiffness times h²/J beside a bristle: the particular solution keeps its digits. What is missing is added for
-a step: a bristle's own spring would bring its damping along, which the corrector cannot take off in short steps."""
+"""Least stiffness times h²/J beside a bristle: the particular solution keeps its digits. Its spring is chosen so, or
+what is missing is added for a step where damping lags by more: it would come along, and no short step takes it off."""
 FARTHEST_LAG = 100.0
 """Largest damping over stiffness, in steps, for the same reason."""
 
@@ -262,16 +263,20 @@ def bend(loop: Loop, h: float) -> Linear:
     total = now.even_stiffness
     damping = now.even_damping
     now.base = now.even_base
-    floor = now.floor
+    chosen, lagging = False, False
+    stiff = STIFF * parameters[INERTIA] / (h * h)
     for i in range(sides_of(loop)):
         side = side_of(loop, i)
         w = side.weight
         if side.kind == BENDS and side.slipping > 0.0:
-            g = bend_bristle(loop, side, h)
+            g = bend_bristle(loop, side, h, total, max(stiff, now.floor))
             total += w * g
             damping += w * side.lag * g
             now.base -= w * g * theta
-            floor = max(floor, STIFF * parameters[INERTIA] / (h * h))
+            if side.lag > h:
+                lagging = True
+            else:
+                chosen = True
         elif side.kind == FOLLOWS and side.slipping > 0.0 and side.varies != 0:
             goal = side.slipping * now.sigma
             b = goal * curve_slope(loop, side, v)
@@ -280,15 +285,18 @@ def bend(loop: Loop, h: float) -> Linear:
             side.damping = side.viscous + b
             damping += w * b
     now.added = 0.0
-    floor = max(floor, abs(damping) / (FARTHEST_LAG * h))
+    floor = max(now.floor, stiff) if lagging else now.floor
+    if lagging or not chosen:
+        floor = max(floor, abs(damping) / (FARTHEST_LAG * h))
     if abs(total) < floor:
         now.added = 2.0 * floor
     return linear(parameters[INERTIA], damping, total + now.added)
 
 
 @kernel(exact=False, inline=True)
-def bend_bristle(loop: Loop, side: Any, h: float) -> float:
-    """Divide a bristle's force; returns its spring."""
+def bend_bristle(loop: Loop, side: Any, h: float, total: float, least: float) -> float:
+    """Divide a bristle's force; returns its spring. ``total`` is the stiffness of all before it, ``least`` what both
+    are to come to."""
     now = loop.now
     theta = now.position
     v = now.velocity
@@ -302,6 +310,9 @@ def bend_bristle(loop: Loop, side: Any, h: float) -> float:
     decay = k * now.sigma * v / s
     # What is relaxed away within the step follows the velocity, not the position.
     g = k * (1.0 - filled * (1.0 - v * steep / s)) / (1.0 + 0.5 * decay * h)
+    w = side.weight
+    if side.lag <= h and abs(total + w * g) < least:
+        g = (math.copysign(least, total + w * g) - total) / w
     side.spring = g
     side.spring_offset = -g * theta
     side.force = force
