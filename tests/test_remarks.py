@@ -30,7 +30,8 @@ def test_a_static_torque_below_the_coulomb_torque_is_remarked_upon():
 
 def test_in_the_other_direction_too():
     with pytest.warns(ModelRemark, match="for v < 0"):
-        Model("lugre", {"symmetry": "asymmetric"}, **FALLING, fs_negative=0.1)
+        model = Model("lugre", {"symmetry": "asymmetric"}, **FALLING, fs_negative=0.1)
+    assert model.parameters.fs_negative == 0.1
 
 
 @pytest.mark.parametrize("values", [FALLING, {**FALLING, "fs": 0.285}])

@@ -13,6 +13,7 @@ from stickslip import plugins
 from stickslip.identify.axis.form import never_falls, of_sliding_form, static_by_name
 from stickslip.laws import LAWS
 from stickslip.model import Model
+from support.sines import sines
 
 CAUCHY = '''"""Friction that falls as 1 / (1 + (v / vs)^2)."""
 import math
@@ -50,16 +51,7 @@ OTHER = {"fc": "level", "df": "excess", "vs": "fall", "sigma2": "slope"}
 def record() -> dict[str, np.ndarray]:
     """Six seconds of three sines, and the torque of an inertia of 0.003 kg·m² under that friction, with noise."""
     t = 1e-3 * np.arange(6001)
-    waves = ((0.9, 0.7, 0.0), (0.35, 1.7, 1.0), (0.12, 3.1, 2.0))
-    q, v, a = (
-        sum(
-            amount
-            * (2.0 * np.pi * rate) ** order
-            * np.sin(2.0 * np.pi * rate * t + phase + order * np.pi / 2.0)
-            for amount, rate, phase in waves
-        )
-        for order in (0, 1, 2)
-    )
+    q, v, a = sines(t, ((0.9, 0.7, 0.0), (0.35, 1.7, 1.0), (0.12, 3.1, 2.0)))
     friction = np.tanh(200.0 * v) * (0.5 + 0.2 / (1.0 + (v / 0.3) ** 2)) + 0.02 * v
     torque = 0.003 * a + friction + 0.005 * np.random.default_rng(7).standard_normal(t.size)
     return {"t": t, "position": q, "torque": torque}
@@ -98,6 +90,8 @@ def test_the_packages_own_names_mean_what_sliding_tells() -> None:
         model = Model(name, **plugins.law(name).example)
         assert of_sliding_form(model, 0.1, 10.0), name
         assert static_by_name(model), name
+    slow = Model("stribeck", k=0.5, fs=0.335, fc=0.285, vs=0.01, sigma2=0.018)
+    assert static_by_name(slow)  # a slope so flat that its fall begins before fs is reached
     law = plugins.law("lugre").having(viscous="power")
     assert not of_sliding_form(Model(law, **law.example), 0.1, 10.0)
 

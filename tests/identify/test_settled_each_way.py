@@ -19,6 +19,7 @@ from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.identify.regression.regression import Regression, regress_axis
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
+from support.sines import sines
 
 AXIS = ServoAxis(drive_side="load")
 TRUE = {"inertia": 4e-3, "fc": 0.3, "sigma2": 0.02, "fc_negative": 0.5, "sigma2_negative": 0.03}
@@ -128,16 +129,7 @@ def test_a_model_that_misses_the_torque_where_the_axis_slides_identifies_nothing
 def test_cogging_that_is_allowed_for_is_not_missed() -> None:
     """As large as friction itself: the numbers do without it, and so does what the model is judged by."""
     t = 1e-3 * np.arange(12001)
-    waves = ((6.0, 0.25, 0.0), (2.5, 0.7, 1.0), (0.4, 2.1, 2.0))
-    q, v, a = (
-        sum(
-            size
-            * (2.0 * np.pi * rate) ** order
-            * np.sin(2.0 * np.pi * rate * t + phase + order * np.pi / 2.0)
-            for size, rate, phase in waves
-        )
-        for order in (0, 1, 2)
-    )
+    q, v, a = sines(t, ((6.0, 0.25, 0.0), (2.5, 0.7, 1.0), (0.4, 2.1, 2.0)))
     noise = 0.005 * np.random.default_rng(7).standard_normal(t.size)
     torque = 0.003 * a + 0.3 * np.sign(v) + 0.002 * v + 0.3 * np.sin(8.0 * q) + noise
     found = ss.identify(t=t, position=q, torque=torque, law="coulomb", torque_is="actual")

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from stickslip.binding import NEGATIVE
-from stickslip.friction_levels import static_level
 from stickslip.identify.regression.regression import Regression
 from stickslip.model import Model
 from stickslip.simulation.prescribed.steady import Steady
@@ -24,6 +23,8 @@ OTHERWISE = {"fc": 1.3, "fs": 1.6, "vs": 3.0, "sigma2": 2.0}
 SPEEDS = 40
 ALIKE = 1e-3
 """Part of friction's level that the curves may be apart."""
+EXCEEDS = 1.05
+"""Times static and Coulomb torque that friction below the Stribeck velocity may be."""
 WIDE = np.geomspace(1e-6, 1e4, 500)
 """rad/s (m/s), over which a fall is looked for."""
 ROUNDING = 1e-9
@@ -71,11 +72,17 @@ def told_with(model: Model | None, found: Regression) -> bool:
 
 
 def static_by_name(model: Model) -> bool:
-    """Whether a law's ``fs`` is what the contact withstands at rest, and not, say, the excess over ``fc``."""
-    fs = getattr(model.parameters, "fs", None)
-    if fs is None or model.law.steady is None:
+    """Whether a law's ``fs`` bounds its friction below the Stribeck velocity, and is not, say, the excess over ``fc``.
+
+    A steep slope or a smooth sign may never reach it: only a curve that exceeds it means another thing.
+    """
+    p = model.parameters
+    if model.law.steady is None or not (hasattr(p, "fs") and hasattr(p, "fc")):
         return True
-    return abs(static_level(model) - fs) <= 0.05 * abs(fs)
+    v = float(getattr(p, "vs", 1.0)) * np.geomspace(1e-3, 1.0, SPEEDS)
+    curve = Steady(model.law, v, np.ones(v.size)).torque(np.array(model.law.pack(p)))
+    level = curve - float(getattr(p, "sigma2", 0.0)) * v
+    return bool(np.max(level) <= EXCEEDS * max(float(p.fs), float(p.fc)))
 
 
 def never_falls(law: Law) -> bool:
