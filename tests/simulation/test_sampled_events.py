@@ -229,3 +229,25 @@ def test_loads_that_reach_the_curve_together_while_the_axis_hardly_moves_let_tim
     outcome = sampled.run(prepare(axis, controller, slow, 1.3, metered=False))
     assert outcome.code == DONE
     assert outcome.counts["steps"] < 5000
+
+
+def test_an_element_at_its_limit_on_an_axis_in_balance_stays():
+    """Rounding of the balance lets it go, and stops the axis at once: a loop came to rest without an end."""
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        forces = SHARE * FS * rng.uniform(-1.0, 1.0, 4)
+        forces[0] = SHARE * FS * (1.0 + rng.uniform(-2.0, 2.0) * 1e-16)
+        u = math.fsum(forces) + rng.uniform(-3.0, 3.0) * 1e-17
+        position, velocity = by_the_engine(forces, [False] * 4, 0.0, u)
+        assert abs(position) < 1e-18
+        assert abs(velocity) < 1e-15
+
+
+@pytest.mark.parametrize("amplitude", [0.022, 0.0444, 0.05, 0.0564, 0.0612])
+def test_a_loop_that_sticks_with_elements_creeping_to_their_limits_has_an_end(amplitude):
+    controller = ss.Controller(ss.Gains(kp=6.1, kd=0.097), torque_limit=1.0, sample_time=TIME)
+    reference = ss.Reference("step", amplitude=amplitude, tau=0.02)
+    outcome = sampled.run(prepare(ss.RigidAxis(J, GMS), controller, reference, 5.0, metered=False))
+    assert outcome.code == DONE
+    assert outcome.counts["steps"] < 20_000
+    assert np.ptp(outcome.rows[outcome.rows[:, 0] > 4.0][:, 3]) < 1e-12

@@ -93,3 +93,17 @@ def test_what_holds_does_not_creep(name):
     assert np.ptp(rows[300:, 3]) == 0.0
     assert abs(rows[-1, 5]) > 1e-3
     assert rows[-1, 6] == rows[-1, 5]
+
+
+@pytest.mark.parametrize(("amplitude", "kp"), [(0.0545, 7.914), (0.115, 4.776)])
+def test_sliding_that_dies_away_slowly_takes_no_more_steps(amplitude, kp):
+    # The loop lets the torque fall to that of sliding, below which the contact at rest holds: the slower it moves,
+    # the shorter a step would have to be that tells the one from the other.
+    controller = ss.Controller(ss.Gains(kp=kp, kd=0.097), torque_limit=1.0, sample_time=TIME)
+    case = case_of(OTHERS["static"], controller, ss.Reference("step", amplitude=amplitude, tau=0.02), 2.0)
+    run = sampled.run(case)
+    assert run.code == DONE
+    assert run.counts["steps"] < 20_000
+    rows = on_grid(run)
+    assert rows[-1, 4] == 0.0
+    assert 0.2 < rows[-1, 5] < 0.335

@@ -258,3 +258,19 @@ def test_what_has_no_located_flow_takes_sub_steps_and_the_record_says_why(machin
     assert why in cannot_locate(machine)
     record = run(machine, ss.Reference("sine", amplitude=0.01, frequency=1.0), 0.05)
     assert why in record.meta["general_step"]
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("made", [train, rigid])
+def test_a_loop_that_comes_to_rest_on_sticking_elements_has_an_end(made, name: str) -> None:
+    """An element at its limit: what rounding leaves of the balance let it go and stopped the axis at once."""
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        gains = ss.Gains(kp=rng.uniform(2.0, 12.0), kd=rng.uniform(0.07, 0.14))
+        controller = ss.Controller(gains, torque_limit=1.0, sample_time=TIME)
+        reference = ss.Reference("step", amplitude=rng.uniform(0.005, 0.12), tau=0.02)
+        record = machine_loop.simulate_machine(
+            made(LAWS[name]), controller, reference, 2.0, metered=False, tolerance=1e-8
+        )
+        assert record.meta["ended"] == 2.0
+        assert abs(record.channels["velocity"][-1]) < 1e-9

@@ -55,6 +55,8 @@ class Plant(NamedTuple):
     motion: Any
     first: Any
     second: Any
+    band: float
+    """velocity up to which the axis counts as at rest, rad/s, where a step asks for it"""
 
 
 # ---- the contact ------------------------------------------------------------------------------------------

@@ -132,7 +132,7 @@ def run_of(laid: Laid) -> Run:
     plant = Plant(
         laid.step, laid.holding, pointer(laid.parameters, 0), pointer(now.around, 0), pointer(laid.states, 0),
         pointer(laid.states, size), pointer(laid.states, 2 * size), size, n, pointer(now.moving, 0),
-        pointer(now.first, 0), pointer(now.second, 0),
+        pointer(now.first, 0), pointer(now.second, 0), 0.0,
     )  # fmt: skip
     return Run(
         plant, record_at(n, AXIS), record_at(pointer(laid.drive, 0), DRIVE), now.memory, now.moving, now.around,

@@ -13,6 +13,7 @@ them: addresses of a compiled law here, the printed law in C (`stickslip.export.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -80,7 +81,10 @@ def step_on(
     a.velocity = end
 
 
-two_stages: Any = compiled_kernels(
-    "step", {"step_on": step_on}, LAYOUTS, dict.fromkeys(contact.GIVEN, contact.__name__)
-).step_on
-"""`step_on` for kernels; all structures but the contact are addresses."""
+def compiled(given: Mapping[str, str]) -> Any:
+    """`step_on` for kernels, with what it calls of the contact from these modules; other structures are addresses."""
+    return compiled_kernels("step", {"step_on": step_on}, LAYOUTS, given).step_on
+
+
+two_stages: Any = compiled(dict.fromkeys(contact.GIVEN, contact.__name__))
+"""`step_on` with the contact of a record."""

@@ -14,9 +14,13 @@ import numpy as np
 
 from stickslip.jit import call_holding, call_step, kernel, pointer
 from stickslip.simulation.case_arrays import INERTIA, PLANT_BAND, Case, surroundings
+from stickslip.simulation.recorded_input import contact
 from stickslip.simulation.recorded_input.contact import AXIS, Plant, axis_of, keep
-from stickslip.simulation.recorded_input.step import GAMMA, LEAST, MOTION, ROUNDING, two_stages
-from stickslip.simulation.root import ROOT, compiled
+from stickslip.simulation.recorded_input.step import GAMMA, LEAST, MOTION, ROUNDING, compiled
+from stickslip.simulation.root import ROOT
+from stickslip.simulation.root import compiled as root
+from stickslip.simulation.sampled import moving
+from stickslip.simulation.sampled.moving import TINY
 from stickslip.simulation.sampled.rates import HOLDS, STEPS
 
 THIRD = 3.0 * GAMMA**2 - 2.0 * GAMMA**3 - 1.0 / 6.0
@@ -26,8 +30,9 @@ SHORTEST = 1e-6
 GROWS, SHRINKS, SAFE, SHORT = 4.0, 0.15, 0.9, 0.8
 """Of a step: what the next one may be longer, or this one shorter; the reserve in its length; and of the time to
 rest, in which the axis is brought near it."""
-TINY = 1e-300
-ready = compiled.ready
+ready = root.ready
+two_stages: Any = compiled(dict.fromkeys(contact.GIVEN, contact.__name__) | {"withheld": moving.__name__})
+"""The step of `recorded_input.step` for an axis that moves."""
 SEARCH, MOVES, INVERSE = len(ROOT.scalars), len(MOTION.scalars), ROOT.scalars.index("inverse")
 AROUND, TIME, APPLIED = 0, 3, 4
 """Places in the surroundings."""
@@ -67,7 +72,6 @@ class Held(NamedTuple):
     """What general steps ask of a law beside its `Plant`. No arrays: references to them are counted at every call."""
 
     holding: int
-    band: float
     kept: Any
     """address of the law's state while a step is tried"""
 
@@ -75,7 +79,7 @@ class Held(NamedTuple):
 @kernel(exact=False)
 def held_of(c: Contact) -> Held:
     """The part of a contact that is handed on at every stretch."""
-    return Held(c.holding, c.band, pointer(c.kept, 0))
+    return Held(c.holding, pointer(c.kept, 0))
 
 
 @kernel(exact=False)
@@ -84,7 +88,7 @@ def plant_of(c: Contact) -> Plant:
     plant = Plant(
         c.step, c.holding, pointer(c.parameters, 0), pointer(c.around, 0), pointer(c.state, 0), pointer(c.base, 0),
         pointer(c.trial, 0), c.state.size, pointer(c.numbers, 0), pointer(c.motion, 0), pointer(c.searches, 0),
-        pointer(c.searches, SEARCH),
+        pointer(c.searches, SEARCH), c.band,
     )  # fmt: skip
     inertia, sharp = axis_of(plant.numbers).inertia, 1.0 - axis_of(plant.numbers).holds
     ready(plant.first, inertia, ROUNDING, LEAST, sharp)
@@ -101,9 +105,9 @@ def torque_at(plant: Plant, v0: float, v1: float, h: float) -> float:
 
 
 @kernel(exact=False)
-def edge_of(c: Held, direction: float) -> float:
+def edge_of(plant: Plant, direction: float) -> float:
     """The velocity at which a law that jumps begins to slide, rad/s."""
-    return direction * max(c.band, TINY)
+    return direction * max(plant.band, TINY)
 
 
 @kernel(exact=False)
@@ -127,11 +131,11 @@ def hold(axis: Any, z: Any, c: Held, plant: Plant, t: float, left: float) -> flo
     held = call_holding(c.holding, push, plant.state, plant.parameters, u)
     excess = z.torque - push * min(abs(z.torque), held)
     taken, leaves = left, excess != 0.0
-    if c.band > 0.0:
+    if plant.band > 0.0:
         # ``goal`` is the velocity that the momentum would make.
         rate = excess / axis.inertia
         push = 1.0 if rate > 0.0 or (rate == 0.0 and z.goal > 0.0) else -1.0
-        room = max(push * (push * c.band - z.goal), 0.0)
+        room = max(push * (push * plant.band - z.goal), 0.0)
         leaves = rate != 0.0 and room <= left * abs(rate)
         taken = room / abs(rate) if leaves else left
         z.goal += rate * taken
@@ -144,8 +148,8 @@ def hold(axis: Any, z: Any, c: Held, plant: Plant, t: float, left: float) -> flo
         keep(plant)
     if leaves:
         z.mode, z.direction = STEPS, push
-        z.velocity = push * c.band
-        edge = edge_of(c, push)
+        z.velocity = push * plant.band
+        edge = edge_of(plant, push)
         z.held = torque_at(plant, edge, edge, 0.0)
         z.acceleration = (z.torque - z.held) / axis.inertia
         z.next = min(z.next, 1e-2 * axis.sample_time)
@@ -154,23 +158,25 @@ def hold(axis: Any, z: Any, c: Held, plant: Plant, t: float, left: float) -> flo
 
 
 @kernel(exact=False)
-def landing(axis: Any, z: Any, c: Held, plant: Plant, h: float) -> tuple[float, float]:
+def landing(axis: Any, z: Any, plant: Plant, h: float) -> tuple[float, float]:
     """When an axis that is below the edge after h comes to rest, s, and how its acceleration bends until then.
 
     From the accelerations now and there; ``trial`` holds the law's state there.
     """
-    edge = edge_of(c, z.direction)
+    edge = edge_of(plant, z.direction)
     there = (z.torque - torque_at(plant, z.velocity, edge, h)) / axis.inertia
     slows = -0.5 * z.direction * (z.acceleration + there)
-    return abs(z.velocity - z.direction * c.band) / slows if slows > 0.0 else math.inf, there - z.acceleration
+    return abs(
+        z.velocity - z.direction * plant.band
+    ) / slows if slows > 0.0 else math.inf, there - z.acceleration
 
 
 @kernel(exact=False)
-def land(axis: Any, z: Any, c: Held, plant: Plant, h: float, bend: float) -> float:
+def land(axis: Any, z: Any, plant: Plant, h: float, bend: float) -> float:
     """Come to rest after h, which is returned; ``trial`` is of `landing`."""
     keep(plant)
-    z.position += 0.5 * h * (z.velocity + z.direction * c.band) - h * h * bend / 12.0
-    z.goal, z.mode, z.events = z.direction * c.band, HOLDS, z.events + 1
+    z.position += 0.5 * h * (z.velocity + z.direction * plant.band) - h * h * bend / 12.0
+    z.goal, z.mode, z.events = z.direction * plant.band, HOLDS, z.events + 1
     z.velocity, z.acceleration, z.held = 0.0, 0.0, z.torque
     return h
 
@@ -178,7 +184,7 @@ def land(axis: Any, z: Any, c: Held, plant: Plant, h: float, bend: float) -> flo
 @kernel(exact=False)
 def step_on(axis: Any, z: Any, c: Held, plant: Plant, t: float, left: float) -> float:
     """One step of a moving axis, at most `left` s long; returns the time taken."""
-    state, kept, moving = plant.state, c.kept, plant.motion
+    state, kept, motion = plant.state, c.kept, plant.motion
     u, q, v = plant.surroundings, z.position, z.velocity
     if c.holding != 0 and v != 0.0:
         z.direction = math.copysign(1.0, v)
@@ -191,11 +197,11 @@ def step_on(axis: Any, z: Any, c: Held, plant: Plant, t: float, left: float) -> 
     u[APPLIED] = z.torque
     while True:
         u[AROUND], u[TIME] = q + 0.5 * h * (v + 0.5 * h * z.acceleration), t + 0.5 * h
-        moving[0], moving[1] = q, v
-        two_stages(plant, plant.numbers, moving, plant.first, plant.second, z.torque, 0.0, h, 1.0)
-        position, end, middle = moving[0], moving[1], moving[2]
+        motion[0], motion[1] = q, v
+        two_stages(plant, plant.numbers, motion, plant.first, plant.second, z.torque, 0.0, h, 1.0)
+        position, end, middle = motion[0], motion[1], motion[2]
         wrong, last = error_of(axis, z, plant, h, middle, end)
-        below = c.holding != 0 and min(z.direction * middle, z.direction * end) <= c.band
+        below = c.holding != 0 and min(z.direction * middle, z.direction * end) <= plant.band
         if (not below and wrong <= axis.local) or (h <= least and (not below or v == 0.0)):
             break
         for i in range(plant.states):
@@ -205,10 +211,10 @@ def step_on(axis: Any, z: Any, c: Held, plant: Plant, t: float, left: float) -> 
             z.failed = 1
             return h
         if below:
-            x, bend = landing(axis, z, c, plant, h)
+            x, bend = landing(axis, z, plant, h)
             near = x * abs(bend) * axis.sample_time <= axis.local or x <= least
             if v != 0.0 and (h <= least or (x <= h and near)):
-                return land(axis, z, c, plant, min(x, h), bend)
+                return land(axis, z, plant, min(x, h), bend)
             h = max(0.5 * h if v == 0.0 else min(SHORT * x, 0.5 * h), least)
         else:
             h = max(h * max(SHRINKS, SAFE * (axis.local / wrong) ** (1.0 / 3.0)), least)

@@ -74,6 +74,9 @@ def stick(axis: Any, z: Any, left: float) -> float:
     z.goal = goal
     taken, direction = left, 0.0
     if not cannot_break(axis, swing):
+        if at_rest(axis, z, swing):
+            z.velocity = z.acceleration = 0.0
+            return left
         taken, direction = first_break(axis, swing, left)
         end = after(swing, taken)
     elif left == axis.sample_time:
@@ -103,6 +106,18 @@ def cannot_break(axis: Any, swing: Swing) -> bool:
         if abs(spring.force + k * swing.goal) + k * reach >= spring.share * level:
             return False
     return True
+
+
+@kernel(exact=False, inline=True)
+def at_rest(axis: Any, z: Any, swing: Swing) -> bool:
+    """Whether what motion there is changes no load by more than loads are told apart.
+
+    Else rounding lets an element at its limit go, and stops the axis at once: without end.
+    """
+    least = axis.near / z.spring
+    return swing.lin.square * swing.off * swing.off + swing.velocity * swing.velocity <= (
+        swing.lin.square * least * least
+    )
 
 
 @kernel(exact=False, inline=True)
