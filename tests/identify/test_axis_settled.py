@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from stickslip.binding import NEGATIVE
+from stickslip.identify.axis import identify
 from stickslip.identify.axis.agreed import held_against
 from stickslip.identify.axis.choice import Candidate, chosen_of, sentence_on
-from stickslip.identify.axis.identify import leaves_more, nothing_more
+from stickslip.identify.axis.identify import leaves_more, nothing_more, worth_comparing
+from stickslip.identify.axis.search import Asked
 from stickslip.identify.axis.settled import settled
-from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.estimate import Estimate, Identification, silent
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
+from stickslip.plugins import law
 
 AXIS = ServoAxis(drive_side="load")
 TRUE = {"inertia": 4e-3, "offset": 0.05, "fc": 0.3, "sigma2": 0.02}
@@ -323,3 +327,21 @@ def test_a_law_that_leaves_more_than_plain_least_squares_gives_way_where_it_is_n
     found = replace(told(law, **{n: n in identified for n in ("k", "fs", "vs", "delta_s")}), misfit=misfit)
     assert leaves_more(found, {*given}) == gives_way
     assert not leaves_more(replace(told(COULOMB), misfit=misfit), set())
+
+
+@pytest.mark.parametrize(
+    ("misfit", "compared"), [(1.2, ["stribeck", "lugre"]), (2.7, ["coulomb", "stribeck", "lugre"])]
+)
+def test_laws_without_a_fall_are_compared_where_no_other_predicts_what_was_held_out(
+    monkeypatch: pytest.MonkeyPatch, misfit: float, compared: list[str]
+) -> None:
+    # Half an arm's record: its fall was another joint's load, and the law with it 1.5 times plain's error on the rest.
+    def judged(evidence, laws, *_):
+        return [scored(law.name, 5, misfit) for law in laws], []
+
+    monkeypatch.setattr(identify, "judged_laws", judged)
+    evidence = SimpleNamespace(sliding=SimpleNamespace(shows_a_fall=True))
+    laws = [law(n) for n in ("coulomb", "stribeck", "lugre")]
+    listed, candidates, more, _ = worth_comparing(evidence, laws, Asked(), "prediction", silent)
+    assert [x.name for x in listed] == [c.law for c in candidates] == compared
+    assert bool(more) == (len(compared) == 2)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identify.axis.form import never_falls
 from stickslip.identify.axis.prediction import motion_of, searched, watched
 from stickslip.identify.axis.search import Asked, errors_of, fitted_axis
 from stickslip.identify.estimate import silent
@@ -25,6 +26,7 @@ from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.observer.innovations import BAND, FIRST, Criterion, robust_std
 from stickslip.identify.observer.observer import Motion, Prepared, prepare
 from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law
@@ -39,6 +41,9 @@ PREDICTED = 2.0
 """Standard deviations of the lowest held-out misfit above which no law is said to predict what was held out."""
 COMPARABLE = 1e-2
 """Relative decrease of the sum of squares at which the fits that are compared end: laws differ by more."""
+NOT_COMPARED = (
+    "Not compared, since friction falls with velocity where the axis slides, and theirs does not: {names}."
+)
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,21 @@ class Candidate:
     score: Array
     start: Mapping[str, Any]
     failure: str = ""
+
+
+def shortlist(laws: Sequence[Law], sliding: Regression | None) -> tuple[list[Law], list[str]]:
+    """The laws worth a comparison, of several, and what is to be said of the others: those without a fall of friction
+    are left out where one shows clearly.
+
+    Where none shows it may lie below the speeds of certain sliding.
+    """
+    if sliding is None or not sliding.shows_a_fall:
+        return list(laws), []
+    level = [law for law in laws if never_falls(law)]
+    if not level or len(level) == len(laws):
+        return list(laws), []
+    names = ", ".join(law.name for law in level)
+    return [law for law in laws if law not in level], [NOT_COMPARED.format(names=names)]
 
 
 def foreseen(
@@ -231,6 +251,11 @@ def chosen_of(candidates: Sequence[Candidate]) -> int:
     return min(near, key=lambda i: (candidates[i].parameters, means[i]))
 
 
+def nothing_foreseen(candidates: Sequence[Candidate]) -> bool:
+    """Whether none of the laws predicts what was held out."""
+    return min(math.sqrt(float(np.mean(c.score))) for c in candidates) > PREDICTED
+
+
 def sentence_on(candidates: Sequence[Candidate], chosen: str) -> str:
     """What the comparison showed."""
     parts = [
@@ -241,7 +266,7 @@ def sentence_on(candidates: Sequence[Candidate], chosen: str) -> str:
         f"Law {chosen!r} is the simplest of those that predict what was held out about as well as any: no other's "
         f"held-out misfit is below it by a standard error and a quarter (in standard deviations: {', '.join(parts)})."
     )
-    if min(math.sqrt(float(np.mean(c.score))) for c in candidates) > PREDICTED:
+    if nothing_foreseen(candidates):
         said += (
             " None of them predicts what was held out, which may be unlike the rest (speeds, load): the choice is "
             "unsure; name a law (--law), or give a record to judge them by (--validation)."

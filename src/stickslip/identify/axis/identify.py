@@ -23,10 +23,19 @@ from stickslip.identify.axis.agreed import (
     on_width,
     regressed,
 )
-from stickslip.identify.axis.choice import Candidate, asked_of, chosen_of, compared, foreseen, sentence_on
+from stickslip.identify.axis.choice import (
+    Candidate,
+    asked_of,
+    chosen_of,
+    compared,
+    foreseen,
+    nothing_foreseen,
+    sentence_on,
+    shortlist,
+)
 from stickslip.identify.axis.drifting import at_the_middle, on_drift
 from stickslip.identify.axis.exponent import is_open, shown
-from stickslip.identify.axis.form import TOLD_BY_SLIDING, never_falls
+from stickslip.identify.axis.form import TOLD_BY_SLIDING
 from stickslip.identify.axis.law_fit import Evidence, against_sliding, estimated
 from stickslip.identify.axis.output import judged
 from stickslip.identify.axis.result import assembled, narrow_note, noted
@@ -53,9 +62,6 @@ SIMPLEST = (
 CLOSER = (
     "Law '{simplest}' is given instead of '{law}', which leaves more of the torque than plain least squares "
     "do: of its additional parameters ({more}) the record does not determine all."
-)
-NOT_COMPARED = (
-    "Not compared, since friction falls with velocity where the axis slides, and theirs does not: {names}."
 )
 SLOWEST = 0.25
 """s between two samples, from which on a record says nothing of an axis's dynamics."""
@@ -144,17 +150,16 @@ def identify_axis(
         require_start(evidence.experiments, axis, tried, asked)
     if not plain_axis(asked) or (per_direction and "offset" not in frozen):
         evidence = replace(evidence, sliding=None)
-    automatic, given = tuple(laws) == AUTOMATIC, asked
+    automatic, given, candidates = tuple(laws) == AUTOMATIC, asked, list[Candidate]()
     if is_open(asked, tried):
         evidence = replace(evidence, exponent_open=True)
         asked, more = shown(asked, evidence.sliding, tried)
         notes = [*notes, *more]
     if len(tried) > 1:
-        tried, more = shortlist(tried, evidence.sliding)
+        tried, candidates, more, by = worth_comparing(evidence, tried, asked, intervals, progress)
         notes = notes if automatic else [*notes, *more]
     chosen, own = tried[0], asked_of(tried[0], asked, tried)
-    if len(tried) > 1:
-        candidates, by = judged_laws(evidence, tried, asked, intervals, progress)
+    if candidates:
         place = chosen_of(candidates)
         chosen, evidence = tried[place], replace(evidence, candidates=candidates)
         own = replace(asked_of(chosen, asked, tried), values=candidates[place].start)
@@ -269,19 +274,22 @@ def looked_at(
     return Evidence(experiments, validation, axis, inverse, sliding, unchecked), said
 
 
-def shortlist(laws: Sequence[Law], sliding: Regression | None) -> tuple[list[Law], list[str]]:
-    """The laws worth a comparison, of several, and what is to be said of the others: those without a fall of friction
-    are left out where one shows clearly.
+def worth_comparing(
+    evidence: Evidence, laws: Sequence[Law], asked: Asked, intervals: str, progress: Callable[[str], None]
+) -> tuple[list[Law], list[Candidate], list[str], list[str]]:  # fmt: skip
+    """The laws of a shortlist, judged where there are several; what is to be said of the others, and of the judging.
 
-    Where none shows it may lie below the speeds of certain sliding.
+    Where none of them predicts what was held out, the fall of friction that left the others out may be another thing:
+    all are judged.
     """
-    if sliding is None or not sliding.shows_a_fall:
-        return list(laws), []
-    level = [law for law in laws if never_falls(law)]
-    if not level or len(level) == len(laws):
-        return list(laws), []
-    names = ", ".join(law.name for law in level)
-    return [law for law in laws if law not in level], [NOT_COMPARED.format(names=names)]
+    listed, more = shortlist(laws, evidence.sliding)
+    if len(listed) == 1:
+        return listed, [], more, []
+    candidates, by = judged_laws(evidence, listed, asked, intervals, progress)
+    if len(listed) < len(laws) and nothing_foreseen(candidates):
+        listed, more = list(laws), []
+        candidates, by = judged_laws(evidence, listed, asked, intervals, progress)
+    return listed, candidates, more, by
 
 
 def nothing_more(found: Identification, given: Set[str]) -> bool:
