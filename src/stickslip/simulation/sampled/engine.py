@@ -211,7 +211,7 @@ def integrate(
     act(control, axis, z, held, plant, 0.0)
     if not math.isfinite(z.torque):
         code = NO_TORQUE
-    put_out(control, axis, z, 0.0, grid, reached, written)
+    put_out(control, axis, z, 0.0, grid, reached, written, True)
     for i in range(stops.shape[0]):
         left = stops[i, 1]
         while left > 0.0 and code == DONE:
@@ -229,7 +229,7 @@ def integrate(
                 if rows.shape[0] - reached.rows <= grid.size - reached.outputs:
                     rows = with_room(rows)
                     written = pointer(rows, 0)
-                write(control, axis, z, time + taken, 1.0, reached, written)
+                write(control, axis, z, time + taken, 1.0, reached, written, False)
                 code = stormy(z, time + taken, storm)
                 if z.mode < STEPS:
                     refresh(axis, z)
@@ -246,7 +246,7 @@ def integrate(
             act(control, axis, z, held, plant, stops[i, 0])
             if not math.isfinite(z.torque):
                 code = NO_TORQUE
-        put_out(control, axis, z, stops[i, 0], grid, reached, written)
+        put_out(control, axis, z, stops[i, 0], grid, reached, written, stops[i, 2] > 0.0)
     if axis.metered:
         close_standstill(output.acc, reached.time)
     return rows[: reached.rows], code
@@ -270,13 +270,14 @@ def advance(axis: Any, z: Any, held: Held, plant: Plant, t: float, left: float) 
 
 @kernel(exact=False, inline=True)
 def act(control: Acting, axis: Any, z: Any, held: Held, plant: Plant, t: float) -> None:
-    """Let the controller sample, and hold what it answers."""
+    """Let the controller sample, and hold what it answers; ``control.motion`` is the reference then."""
     motion = control.motion
     call_profile(control.profile, t + NUDGE, control.reference_parameters, motion)
+    motion[0] -= NUDGE * motion[1]
     control.surroundings[0], control.surroundings[3] = z.position + z.moved, t
     z.torque = call_sample(
         control.controller, measured_position(z.position + z.moved, control.encoder),
-        motion[0] - NUDGE * motion[1], motion[1], motion[2], control.settings, control.memory, control.state,
+        motion[0], motion[1], motion[2], control.settings, control.memory, control.state,
         control.parameters, control.surroundings,
     )  # fmt: skip
     if control.memory[control.fault] != 0.0:

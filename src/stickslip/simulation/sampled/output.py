@@ -62,13 +62,16 @@ class Grid(NamedTuple):
 
 
 @kernel(exact=False, inline=True)
-def write(control: Any, axis: Any, z: Any, t: float, event: float, reached: Any, rows: Any) -> None:
-    """Write the row at t, for which there is room at the address `rows`.
+def write(
+    control: Any, axis: Any, z: Any, t: float, event: float, reached: Any, rows: Any, known: bool
+) -> None:  # fmt: skip
+    """Write the row at t, for which there is room at the address `rows`; whether the reference there is `known`.
 
     An address and no array: counting references to arrays would cost more than the row.
     """
     row, motion = pointer(rows, reached.rows * len(COLUMNS)), control.motion
-    call_profile(control.profile, t, control.reference_parameters, motion)
+    if not known:
+        call_profile(control.profile, t, control.reference_parameters, motion)
     row[0], row[1], row[2] = t, motion[0], motion[1]
     row[3], row[4] = z.position + z.moved, z.velocity
     row[5], row[6] = z.torque, friction(axis, z)
@@ -78,10 +81,12 @@ def write(control: Any, axis: Any, z: Any, t: float, event: float, reached: Any,
 
 
 @kernel(exact=False, inline=True)
-def put_out(control: Any, axis: Any, z: Any, t: float, grid: Grid, reached: Any, rows: Any) -> None:
-    """Write the rows of the output times up to t."""
+def put_out(
+    control: Any, axis: Any, z: Any, t: float, grid: Grid, reached: Any, rows: Any, known: bool
+) -> None:  # fmt: skip
+    """Write the rows of the output times up to t, at which the reference may be `known`."""
     while reached.outputs < grid.size and grid.times[reached.outputs] <= t + 1e-12 * max(1.0, t):
-        write(control, axis, z, grid.times[reached.outputs], 0.0, reached, rows)
+        write(control, axis, z, grid.times[reached.outputs], 0.0, reached, rows, known)
         reached.outputs += 1
 
 
