@@ -253,7 +253,10 @@ def test_the_loop_that_the_user_has_goes_all_the_way(
     assert loop_run.velocity_filter == 200.0
     export = ["export", str(out), "--to", "c99", "--compensator", "recommended", "--out", str(tmp_path / "c")]
     assert main(export) == 0
-    assert "it was tried with the loop of kv 30, kvp 0.08, kvi 1.2, feed 0.5" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "the loop of kv 30, kvp 0.08, kvi 1.2, feed 0.5 and both torques together within ±3 N·m" in said
+    how = (tmp_path / "c" / "README.md").read_text()
+    assert "limit their sum to what the motor gives. `n.torque_limit` limits this part alone" in how
 
 
 @pytest.mark.parametrize(

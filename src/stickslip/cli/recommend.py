@@ -88,7 +88,7 @@ def drive_arguments(parser: argparse.ArgumentParser) -> None:
         "--loop", metavar="kp=..,kd=..",
         help="gains of the existing loop: kp (N·m/rad), ki, kd, kr of a PID; or kv (1/s), kvp (N·m·s/rad), kvi "
         "(N·m/rad), feed (share of the velocity feedforward, default 1) of a position P loop around a velocity PI "
-        "loop; optionally filter (Hz, velocity low-pass) and limit (N·m)",
+        "loop; optionally filter (Hz, first-order low-pass on the velocity) and limit (N·m)",
     )  # fmt: skip
     parser.add_argument(
         "--controller", type=Path, metavar="FILE.toml",

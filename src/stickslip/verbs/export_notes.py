@@ -62,7 +62,9 @@ def notes_on_controller(
         found = recommended_in(content)
         what = "the loop of" if found.gains else f"a PD of {found.bandwidth:.4g} Hz:"
         gains = ", ".join(f"{k} {v:.5g}" for k, v in found.linear._asdict().items() if v or k == "feed")
-        yield f"it was tried with {what} {gains}; the linear controller is not in the export"
+        within = f" and both torques together within ±{found.torque_limit:.5g} N·m"
+        limit = within if math.isfinite(found.torque_limit) else ""
+        yield f"it was tried with {what} {gains}{limit}; the linear controller is not in the export"
         yield from angle_left_out(content)
     else:
         yield from other_recommendation(content)

@@ -78,8 +78,8 @@ def recommend(
         What they place.
     loop : str or mapping, optional
         The drive's own loop instead: kp (N·m/rad), ki, kd, kr of a PID, or kv (1/s), kvp (N·m·s/rad), kvi (N·m/rad),
-        feed (part of the reference velocity fed forward) of position P around velocity PI; with filter (Hz, low-pass
-        on its velocity) and limit (N·m).
+        feed (part of the reference velocity fed forward) of position P around velocity PI; with filter (Hz,
+        first-order low-pass on its velocity) and limit (N·m).
     controller : Controller or path, optional
         The drive's own loop made of control laws instead, observers and all, but without friction laws; a path is that
         of a file with a table [controller].
