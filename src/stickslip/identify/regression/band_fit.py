@@ -223,8 +223,9 @@ def summed_up(
     """Means over the candidates, their spread among the variances."""
     kept = [(w, c) for w, c in zip(weight, candidates, strict=True) if w > 1e-4]
     total = sum(w for w, _ in kept)
+    spread = system.covariances(torque, [c for _, c in kept])
     braking = [
-        brakes(c.values / system.scale[c.columns], system.covariance(torque, c)) for _, c in kept
+        brakes(c.values / system.scale[c.columns], s) for (_, c), s in zip(kept, spread, strict=True)
     ]  # fmt: skip
     values, spreads = [v for v, _ in braking], [s for _, s in braking]
 

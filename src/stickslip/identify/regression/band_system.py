@@ -292,9 +292,14 @@ class System:
 
     def residual(self, torque: Array, c: Candidate) -> Array:
         """What a candidate leaves, N·m (N)."""
-        coefficients = np.zeros(self.columns.shape[1])
-        coefficients[c.columns], coefficients[self.small] = c.values, c.small
-        return torque - self.columns @ coefficients
+        return self._residuals(torque, [c])[:, 0]
+
+    def _residuals(self, torque: Array, candidates: Sequence[Candidate]) -> Array:
+        """Those of several, shape (n, candidates)."""
+        coefficients = np.zeros((self.columns.shape[1], len(candidates)))
+        for k, c in enumerate(candidates):
+            coefficients[c.columns, k], coefficients[self.small, k] = c.values, c.small
+        return torque[:, None] - self.columns @ coefficients
 
     def weights(self, candidates: Sequence[Candidate]) -> Array:
         """Probability of every candidate after the record."""
@@ -323,15 +328,25 @@ class System:
         return weight / weight.sum()
 
     def covariance(self, torque: Array, c: Candidate) -> Array:
-        """Of a candidate's values: noise that pieces share, what no law holds, the rounding of the torque, and misfit
-        that does not average out."""
-        residual = self.residual(torque, c)
+        """Of a candidate's values."""
+        return self.covariances(torque, [c])[0]
+
+    def covariances(self, torque: Array, candidates: Sequence[Candidate]) -> list[Array]:
+        """Of the values of several, whose sums over pieces are made together."""
+        residuals = self._residuals(torque, candidates)
         begins = np.flatnonzero(np.concatenate([[True], np.diff(self.piece) != 0]))
-        bounds = pairwise([*begins.tolist(), residual.size])
-        sums = np.array([residual[i:j] @ self.columns[i:j] for i, j in bounds])
+        bounds = pairwise([*begins.tolist(), len(residuals)])
+        sums = np.array([residuals[i:j].T @ self.columns[i:j] for i, j in bounds])
+        squares = np.sum(residuals * residuals, axis=0).tolist()
+        return [self._covariance(c, sums[:, k], squares[k]) for k, c in enumerate(candidates)]
+
+    def _covariance(self, c: Candidate, sums: Array, square: float) -> Array:
+        """By the sums of its residual times the columns over pieces, and its square: noise that pieces share, what no
+        law holds, the rounding of the torque, and misfit that does not average out."""
+        pieces = len(sums)
         # What the small columns explain of the others is taken out of a piece's sum, which is as good as of every row.
         scores = sums[:, c.columns] - sums[:, self.small] @ c.mixing
-        count = student(begins.size - 1) ** 2 * begins.size / max(1, begins.size - 1)
+        count = student(pieces - 1) ** 2 * pieces / max(1, pieces - 1)
         noise = c.inverse @ (scores.T @ scores) @ c.inverse * count
         shrunk = self.products[np.ix_(c.columns, self.small)]
         shrunk = shrunk - c.mixing.T @ self.products[np.ix_(self.small, self.small)]
@@ -343,13 +358,13 @@ class System:
         least, plain = self.noise * self.memory * np.diag(c.inverse), np.diag(noise)
         # Whole pieces tell level and slope of friction: where many of them refute the misfit's say, they decide.
         # Of acceleration, jerk and offset a piece holds too little.
-        most = refuted_above(begins.size - c.columns.size)
+        most = refuted_above(pieces - c.columns.size)
         if math.isfinite(most):
             decided = np.isin(c.columns, (VISCOUS, COULOMB))
             least = np.where(decided, np.minimum(least, most * plain), least)
         noise[np.diag_indices_from(noise)] = np.maximum(plain, least)
         share = np.full(c.columns.size, SYSTEMATIC)
         share[[INERTIA, JERK]] = STIFF, LATE
-        coherent = np.diag(share**2 * float(residual @ residual) * np.diag(c.inverse))
+        coherent = np.diag(share**2 * square * np.diag(c.inverse))
         scale = self.scale[c.columns]
         return (noise + moved @ moved.T + rounded @ rounded.T + coherent) / np.outer(scale, scale)
