@@ -46,6 +46,33 @@ def test_the_reference_of_a_log_is_kept_to_a_thousandth() -> None:
     np.testing.assert_allclose(again.sampled(T)[:, 0], samples[:, 0], atol=1e-5)
 
 
+def brisk(dwell: int = 300) -> np.ndarray:
+    """Moves to and fro of 12 rad/s with dwells, that reach 800 rad/s² within 15 ms."""
+    move = np.concatenate(
+        [np.full(n, a) for n, a in ((15, 1.0), (15, -1.0), (200, 0.0), (15, -1.0), (15, 1.0))]
+    )
+    pause = np.zeros(dwell)
+    jerk = 800.0 / 0.015 * np.concatenate([pause, move, pause, -move, pause] * 4)
+    velocity = np.cumsum(np.cumsum(jerk) * T) * T
+    velocity[np.abs(velocity) < 1e-9] = 0.0
+    return np.cumsum(velocity) * T
+
+
+def test_a_kept_motion_goes_back_nowhere_but_where_the_reference_does() -> None:
+    wanted = brisk()
+    samples = motion_of(record(wanted, position_reference=wanted), "log.csv").sampled(T)
+    sides = np.sign(samples[:, 1])
+    assert not np.any(sides[1:] * sides[:-1] < 0.0)  # Between two moves it rests.
+    assert np.min(samples[:, 0]) >= -1e-9
+    assert np.max(samples[:, 0]) <= np.max(wanted) + 1e-9
+
+
+def test_a_turn_between_two_points_stays_where_it_is() -> None:
+    t, w = 0.01 * np.arange(401) + 0.005, math.pi
+    samples = Motion(t, -0.1 * np.cos(w * t), 0.1 * w * np.sin(w * t)).sampled(T)
+    assert np.max(np.abs(samples[200:3900, 2])) == pytest.approx(0.1 * w * w, rel=1e-3)
+
+
 def test_of_a_long_log_the_seconds_with_most_motion_are_kept() -> None:
     motion = motion_of(record(moves(60.0, at=30.0)))
     assert motion.duration == pytest.approx(LONGEST, abs=0.05)

@@ -28,6 +28,8 @@ RUN_UP = 0.1
 """s, in which a motion that begins (or ends) under way is brought from (or to) rest."""
 HOLD = 1.0
 """s at rest after the motion, of which the second half is judged."""
+STEEPEST = 3.0
+"""Times the mean velocity between two points, that a cubic may have at either without going back in between."""
 REST = 0.01
 """Of the greatest speed, below which a motion's end is at rest."""
 WINDOW = 0.02
@@ -88,6 +90,7 @@ class Motion:
         after it."""
         interpolate: Any = importlib.import_module("scipy.interpolate")
         time, position, velocity = self._from_rest_to_rest()
+        velocity = without_overshoot(time, position, velocity)
         curve = interpolate.CubicHermiteSpline(time - time[0], position - position[0], velocity)
         t = sample_time * np.arange(math.ceil((time[-1] - time[0] + HOLD) / sample_time))
         held = np.minimum(t, time[-1] - time[0])
@@ -117,6 +120,26 @@ class Motion:
             "position": _rounded(self.position, 1e-7 * span),
             "velocity": _rounded(self.velocity, 1e-5 * top),
         }
+
+
+def without_overshoot(time: Array, position: Array, velocity: Array) -> Array:
+    """The velocities at the points, rad/s, lowered where the cubics would go back between two points.
+
+    A velocity taken over a few milliseconds is too high where a motion begins or ends: the cubic then passes the place
+    of rest and comes back, by as much as a contact's springs bend, and a feedforward answers a reversal that no drive
+    commands. Between velocities to either side the motion turns, and its cubic does so once.
+    """
+    mean, given = np.diff(position) / np.diff(time), np.asarray(velocity, dtype=np.float64)
+    while True:
+        turns = given[:-1] * given[1:] < 0.0
+        low = np.where(turns, -np.inf, STEEPEST * np.minimum(mean, 0.0))
+        high = np.where(turns, np.inf, STEEPEST * np.maximum(mean, 0.0))
+        kept = given.copy()
+        kept[:-1] = np.clip(kept[:-1], low, high)
+        kept[1:] = np.clip(kept[1:], low, high)
+        if np.array_equal(kept, given):
+            return kept
+        given = kept
 
 
 def _rounded(values: Array, step: float) -> list[float]:
