@@ -21,8 +21,9 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade
 from stickslip.errors import ParameterError
 from stickslip.model import Model
-from stickslip.recommend.candidate_run import AT_REST, Drive, Trial, dangers, simulated
+from stickslip.recommend.candidate_run import AT_REST, Drive, Trial, dangers
 from stickslip.recommend.candidates import NEAR, Bench
+from stickslip.recommend.following import simulated
 from stickslip.recommend.swings import back_and_forth, between_counts
 
 RESTS = 20.0

@@ -17,16 +17,11 @@ from stickslip.control.learned import after
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import ParameterError
 from stickslip.identify.motion import HOLD, Motion, sinusoid
-from stickslip.jit import kernel
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.recommend.plant import Plant, laid_out
+from stickslip.recommend.following import followed, setpoints_of, simulated
+from stickslip.recommend.plant import Plant
 from stickslip.recommend.swings import above, repeats, reversals, turns
-from stickslip.rigs.loop_sample import COLUMNS, Control, control_of, decide, finished
-from stickslip.rigs.rig import Limits, setpoints
-from stickslip.simulation.machine.layout import look, stand_at
-from stickslip.simulation.machine.plant import Laid, plant_of
-from stickslip.simulation.machine.step import sample
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -54,7 +49,6 @@ SMALLEST = 1e-12
 """rad (m), of a motion."""
 HELD = 2.0
 """s, of which the second half is judged."""
-UNLIMITED = Limits(torque=1e300, speed=1e300)
 
 
 @dataclass(frozen=True)
@@ -314,47 +308,6 @@ def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
         },
         position, np.ascontiguousarray(reference[:, 0]), time, after(controller, state, time),
     )  # fmt: skip
-
-
-def simulated(plant: RigidAxis, controller: Controller, reference: Array, start: float = 0.0) -> Array | None:
-    """Positions of the axis itself at every sample along a reference, rad; None where it diverges.
-
-    The axis starts at rest at `start`, rad.
-    """
-    return followed(plant, controller, setpoints_of(reference), start)[0]
-
-
-def setpoints_of(reference: Array) -> Array:
-    """Position, velocity and acceleration of a reference for the closed loop."""
-    q, v, a = reference.T
-    return setpoints(len(reference), position=q, velocity=v, acceleration=a, closed=1.0)
-
-
-def followed(
-    plant: RigidAxis, controller: Controller, path: Array, start: float = 0.0
-) -> tuple[Array | None, Array]:
-    """As `simulated`, along setpoints, and the state in which it leaves the controller's laws."""
-    control = control_of(controller, UNLIMITED, controller.sample_time)
-    laid = laid_out(plant, controller.sample_time, controller.encoder_counts)
-    stand_at(laid, start)
-    look(laid, control.measured)
-    positions = np.empty(len(path))
-    done = follow(laid, control, path, np.empty(len(COLUMNS)), positions)
-    ended = done == len(path) and bool(np.all(np.isfinite(positions)))
-    return positions if ended else None, control.state
-
-
-@kernel()
-def follow(laid: Laid, control: Control, path: Any, row: Any, positions: Any) -> int:
-    """The loop of `stickslip.rigs.virtual.run_block`, that keeps the axis's own positions; how many samples ran."""
-    plant = plant_of(laid)
-    for k in range(path.shape[0]):
-        positions[k] = plant.axis[plant.machine.shaft]
-        torque = decide(control, path[k], row)
-        sample(plant, torque, control.measured)
-        if finished(control):
-            return k + 1
-    return path.shape[0]
 
 
 def rings(plant: RigidAxis, linear: Controller, drive: Drive, alone: Trial | str) -> str:

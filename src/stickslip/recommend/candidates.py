@@ -19,6 +19,9 @@ from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 from stickslip.recommend.candidate_run import Drive, Trial, dangers, rings, run
+from stickslip.recommend.pushed import FINER, swings, swings_on
+
+AFTER_A_PUSH = "limit cycle at rest after a push"
 
 FOLLOWS, LIVELY = 3.0, 5.0
 """An axis that the drive's own loop does not hold is not the user's: times the best estimate's error, and swings per
@@ -160,6 +163,7 @@ class Bench:
         self.alone: list[Trial | str] = []
         self.left_out = 0
         self._judged: dict[Setting, Candidate] = {}
+        self._pushed: dict[int, float] = {}
 
     @staticmethod
     def held(
@@ -223,9 +227,26 @@ class Bench:
                 why = after if isinstance(after, str) else "the linear controller alone fails"
                 return Candidate(setting, (*errors, math.inf), (why,))
             errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
-            if unsafe := tuple(dangers(before, after, self.drive, setting.kind == "feedforward")):
+            unsafe = tuple(dangers(before, after, self.drive, setting.kind == "feedforward"))
+            if not unsafe and setting.kind == "feedback" and self.swings_on(len(errors) - 1, controller):
+                unsafe = (AFTER_A_PUSH,)
+            if unsafe:
                 return Candidate(setting, tuple(errors), unsafe)
         return Candidate(setting, tuple(errors), ())
+
+    def swings_on(self, i: int, controller: Controller) -> bool:
+        """Whether after a push at rest axis i swings on under this controller, and not under the linear one."""
+        plant, before = self.plants[i], self.before(i)
+        if not isinstance(before, Trial):
+            return False
+        least = before.swing(self.drive)
+
+        def alone() -> float:
+            if i not in self._pushed:
+                self._pushed[i] = max(swings(plant, self.linear, self.drive, least, FINER))
+            return self._pushed[i]
+
+        return swings_on(plant, controller, self.drive, least, alone)
 
 
 def lost(trial: Trial | str, best: Trial | str, drive: Drive) -> bool:

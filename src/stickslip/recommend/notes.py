@@ -101,9 +101,8 @@ def notes_on(
         )
     simulated = (
         "Simulated with a rigid axis, a current loop, up to a sample of delay, friction that comes late as "
-        "behind an elastic drivetrain, and torques over the position as large as the model's misfit; resonances and "
-        "backlash are not "
-        "in it: for them"
+        "behind an elastic drivetrain, and torques over the position as large as the model's misfit; resonances, "
+        "backlash and noise in the current are not in it (in place of noise a feedback is pushed at rest): for them"
     )
     if machine is not None:
         simulated = (

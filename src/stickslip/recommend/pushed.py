@@ -1,0 +1,75 @@
+"""A feedback that is pushed at rest: whether the motion dies away as under the linear controller alone.
+
+A compensator that follows the measured velocity may rest by itself and still have a limit cycle beside that rest. A
+drive's noise, a load that changes or a hand reaches it: the velocity filter, the delay and the law's own springs turn
+its torque later than the motion. So what rests is pushed off the place that it sticks at, too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from stickslip.control.controller import Controller
+from stickslip.friction_levels import static_level
+from stickslip.identify.fit.parallel import in_turn
+from stickslip.machines.rigid import RigidAxis
+from stickslip.recommend.candidate_run import BUSY, Drive
+from stickslip.recommend.following import simulated
+from stickslip.recommend.swings import back_and_forth, repeats, turns
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+PUSHES = (0.8, 1.0, 1.5, 2.0)
+"""Of the torque that the contact withstands at rest."""
+FINER = tuple(0.8 + 0.1 * step for step in range(15))
+"""The same for the linear controller alone: an integral hunts after some of them only, and so much is not a
+compensator's."""
+MORE = 1.5
+"""Times the linear controller's largest swing: beyond that a compensator makes it worse."""
+PUSHED = 10e-3
+"""s, for which each acts at most."""
+BEFORE, AFTER, JUDGED = 0.2, 3.0, 2.0
+"""s at rest before a push, and behind it; of which the last are judged."""
+
+
+def pushes(plant: RigidAxis, drive: Drive, shares: Sequence[float] = PUSHES) -> Iterator[Array]:
+    """Torques at every sample, N·m: each ends before it brings the axis to the motion's own top speed."""
+    friction = plant.friction
+    held = max(static_level(friction), static_level(friction, -1.0)) if friction.law.steady else 0.0
+    time = drive.sample_time
+    if not 0.0 < held < math.inf:
+        return
+    for share in shares:
+        longest = min(PUSHED, drive.path.top_speed * plant.inertia / (share * held))
+        push = np.zeros(round((BEFORE + AFTER) / time))
+        begin = round(BEFORE / time)
+        push[begin : begin + max(1, round(longest / time))] = share * held
+        yield push
+
+
+def swings(
+    plant: RigidAxis, controller: Controller, drive: Drive, least: float, shares: Sequence[float] = PUSHES
+) -> Iterator[float]:
+    """What it swings by long after each push, rad; 0 where it does not go on by more than `least`, infinite where it
+    diverges."""
+
+    def after(push: Array) -> float:
+        position = simulated(plant, controller, np.zeros((push.size, 3)), push=push)
+        if position is None:
+            return math.inf
+        late = position[-round(JUDGED / drive.sample_time) :]
+        on = turns(late, least) > BUSY * JUDGED and repeats(late, least)
+        return back_and_forth(late) if on else 0.0
+
+    yield from in_turn(after, pushes(plant, drive, shares))
+
+
+def swings_on(
+    plant: RigidAxis, controller: Controller, drive: Drive, least: float, alone: Callable[[], float]
+) -> bool:
+    """Whether after a push it swings on by more than the linear controller does, `alone`, which few cases ask for."""
+    return any(swing > MORE * alone() for swing in swings(plant, controller, drive, least) if swing > 0.0)
