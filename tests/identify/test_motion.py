@@ -68,7 +68,7 @@ def test_a_kept_motion_goes_back_nowhere_but_where_the_reference_does() -> None:
 
 
 def test_a_turn_between_two_points_stays_where_it_is() -> None:
-    t, w = 0.01 * np.arange(401) + 0.005, math.pi
+    t, w = np.asarray(0.01 * np.arange(401) + 0.005, dtype=np.float64), math.pi
     samples = Motion(t, -0.1 * np.cos(w * t), 0.1 * w * np.sin(w * t)).sampled(T)
     assert np.max(np.abs(samples[200:3900, 2])) == pytest.approx(0.1 * w * w, rel=1e-3)
 

@@ -24,7 +24,11 @@ def drive() -> Drive:
     s = np.clip(T * np.arange(1500) / 0.5 - 0.2, 0.0, 1.0)
     one = s - np.sin(2.0 * np.pi * s) / (2.0 * np.pi)
     position = 6.0 * np.concatenate([one, one[-1] - one])
-    record = Record(T * np.arange(position.size), {"position": position}, {"position": "rad"})
+    record = Record(
+        np.asarray(T * np.arange(position.size), dtype=np.float64),
+        {"position": position},
+        {"position": "rad"},
+    )
     return Drive(
         gains=Cascade(kv=35.12, kvp=0.4131, kvi=10.88, feed=1.0), velocity_filter=500.0, sample_time=T,
         encoder_counts=262144, torque_limit=8.36, motion=motion_of(record),
