@@ -177,3 +177,8 @@ def encoder_step(position: Array) -> float:
     step = float(np.mean(changes[changes < 1.5 * step]))
     multiples = changes[changes < 50.0 * step] / step
     return step if float(np.mean(np.abs(multiples - np.round(multiples)) < 0.02)) > 0.95 else 0.0
+
+
+def row_period(record: Record) -> float:
+    """Usual time from one row to the next, s, to three digits; 0 where there are fewer than two rows."""
+    return float(f"{float(np.median(np.diff(record.time))):.3g}") if record.time.size > 1 else 0.0

@@ -69,7 +69,7 @@ def drive_arguments(parser: argparse.ArgumentParser) -> None:
         "--sample-time",
         type=float,
         metavar="S",
-        help="sample time of the drive (default the machine's, or 0.001)",
+        help="sample time of the drive (default the machine's, else that of the identified record, or 0.001)",
     )
     parser.add_argument(
         "--counts-per-rev",

@@ -37,7 +37,7 @@ class Identified:
     motion : str
         "rotary" or "linear".
     data : tuple of mapping
-        ``file``, ``sha256``, ``rows`` of every record.
+        ``file``, ``sha256``, ``rows``, ``sample_time`` (s, between its rows) of every record.
     misfit : mapping of str to float
     trajectory : Motion or None
         The motion of the record that it was identified on.
@@ -64,6 +64,16 @@ class Identified:
         if self.motion == "rotary":
             return angular
         return angular.replace("kg·m²", "kg").replace("N·m", "N").replace("rad", "m")
+
+    @property
+    def sampled(self) -> tuple[float, str]:
+        """Shortest time between rows of its records, s, and the file of that record; 0 and "" where it is not told."""
+        told = [
+            (float(period), str(d.get("file", "")))
+            for d in self.data
+            if isinstance(period := d.get("sample_time"), (int, float)) and 0.0 < period < math.inf
+        ]
+        return min(told, default=(0.0, ""))
 
     @property
     def law_estimates(self) -> tuple[tuple[Estimate, ...], Array]:

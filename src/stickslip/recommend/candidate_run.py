@@ -61,6 +61,8 @@ class Drive:
         Of the position loop's poles, Hz and -; the linear controller is placed with the model's inertia.
     sample_time : float
         s
+    sample_time_from : str
+        For people: where that is from; empty where nobody needs to be told.
     encoder_counts : float
         Per revolution (2 pi); 0 measures exactly.
     torque_limit : float
@@ -97,6 +99,7 @@ class Drive:
     motion: Motion | None = None
     controller: Controller | None = None
     machine: Machine | None = None
+    sample_time_from: str = ""
 
     def __post_init__(self) -> None:
         insist_on_own(self, "drive")
@@ -201,11 +204,8 @@ class Drive:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        out = {
-            f.name: getattr(self, f.name)
-            for f in fields(self)
-            if f.name not in ("gains", "motion", "controller", "machine")
-        }
+        apart = ("gains", "motion", "controller", "machine")
+        out = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in apart}
         path = self.path
         return out | {
             "gains": self.gains._asdict() if self.gains else None,

@@ -20,6 +20,8 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 from stickslip.recommend.candidate_run import Drive, Trial, dangers, rings, run
 from stickslip.recommend.pushed import FINER, swings, swings_on
+from stickslip.recommend.ringing import by_counts, hunting, integral_of, swing_at_rest, within_counts
+from stickslip.recommend.swings import between_counts
 
 AFTER_A_PUSH = "limit cycle at rest after a push"
 
@@ -281,31 +283,52 @@ def resistance(model: Model, drive: Drive) -> float:
 
 
 def rings_alone(bench: Bench, inertia: float, torque: str) -> str:
-    """Where the linear controller alone oscillates, and at which bandwidth it does not; empty where it is calm."""
-    ringing = list(bench.ringing())
+    """Where the linear controller alone oscillates, by how much, why, and what to change; empty where it is calm."""
+    drive, gains, count = bench.drive, bench.linear.gains, len(bench.plants[:LOOKED_AT])
+    push = bench.linear.linear.kd * drive.deadband(1.0) if gains is not None else 0.0
+    ringing = list(_telling(bench, push))
     if not ringing:
         return ""
-    drive, count = bench.drive, len(bench.plants[:LOOKED_AT])
-    where = " and ".join(sorted({where for _, where in ringing}))
+    where = " and ".join(sorted({where for _, where, _ in ringing}))
     on = f"on {len(ringing)} of {count} axes" if count > 1 else "on the best estimate"
-    gains = bench.linear.gains
     if gains is None:
         return f"{where} {on}; lower its gains, or take a finer encoder or a shorter sample time"
-    push = bench.linear.linear.kd * drive.deadband(1.0)
-    why = f": a count of the encoder makes it push {push:.2g} {torque} for a sample" if push else ""
-    plants = [plant for plant, _ in ringing]
-    finer = ", or take a finer encoder" if push else ", or a shorter sample time"
+    swing, plants = max(swing for _, _, swing in ringing), [plant for plant, _, _ in ringing]
+    size = f" (at rest by up to {swing:.2g} {'m' if torque == 'N' else 'rad'} peak to peak)"
+    # What swings wider than counts allow is at most set off by them: an exact encoder only delays it.
+    wide = integral_of(gains)[1] > 0.0 and swing > between_counts(drive.encoder_counts)
+    counts = not wide and by_counts(plants, bench.linear, drive)
+    if not counts and integral_of(gains)[1] > 0.0:
+        return f"{where} {on}{hunting(gains, drive.given)}{size}"
+    why = (
+        f": a count of the encoder makes it push {push:.2g} {torque} for a sample{size}"
+        if counts and push
+        else size
+    )
+    finer = ", or take a finer encoder" if counts and push else ", or a shorter sample time"
     if drive.given:
         return f"{where} {on}{why}; lower the gain on the velocity ({velocity_gain(gains):.4g}){finer}"
+    return f"{where} {on}{why}; {_calmer(bench, plants, inertia)}{finer}"
+
+
+def _telling(bench: Bench, push: float) -> Iterator[tuple[RigidAxis, str, float]]:
+    """The axes that oscillate, where, and peak to peak at rest, rad; not those that stay within an encoder's counts."""
+    index = {id(plant): i for i, plant in enumerate(bench.plants)}
+    for plant, where in bench.ringing():
+        swing = swing_at_rest(plant, bench.linear, bench.drive, bench.before(index[id(plant)]))
+        if where != "at rest" or not within_counts(swing, push, breakaway(plant.friction), bench.drive):
+            yield plant, where, swing
+
+
+def _calmer(bench: Bench, plants: Sequence[RigidAxis], inertia: float) -> str:
+    """At which bandwidth the axes do not oscillate."""
+    drive = bench.drive
     for share in SLOWER:
         slower = replace(drive, bandwidth=share * drive.bandwidth)
         linear = replace(bench.linear, gains=place(drive.linear, inertia, slower.bandwidth, drive.damping))
         if not any(Bench(plants, linear, slower, {}).ringing()):
-            calm = f"lower the bandwidth ({slower.bandwidth:.3g} Hz is calm)"
-            break
-    else:
-        calm = f"no bandwidth down to {SLOWER[-1] * drive.bandwidth:.3g} Hz is calm"
-    return f"{where} {on}{why}; {calm}{finer}"
+            return f"lower the bandwidth ({slower.bandwidth:.3g} Hz is calm)"
+    return f"no bandwidth down to {SLOWER[-1] * drive.bandwidth:.3g} Hz is calm"
 
 
 def velocity_gain(gains: Gains | Cascade) -> float:

@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
-from stickslip.control.linear import Cascade
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Cascade, Gains
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.recommend.candidate_run import Drive, Trial
+from stickslip.recommend.candidate_run import Drive, Trial, run
 from stickslip.recommend.candidates import Bench, Candidate, resistance
 
-MOSTLY = 0.8
-"""Part of the error from which on a lag is most of it."""
+MOSTLY = 0.5
+"""Of the error: what a lag makes beyond that is most of it."""
+WORTH = 0.95
+"""A compensator that leaves more than this part of the error is not worth its risk."""
 ALLOWANCE, BETTER = 1.4, 2.0
 """Factors on the error left, upwards and downwards, for resonances, backlash, cogging and the like, which a machine has
 or has not: so the promise held in `benchmarks/promise.py`."""
+HARDLY = f"hardly less error (more than {100.0 * WORTH:g} % left)"
+UNSURE = f"no certain reduction (more than {100.0 / ALLOWANCE:.0f} % left)"
+"""Why a safe setting is not worth it."""
+
+
+def sampled_as(drive: Drive) -> Iterator[str]:
+    """The sample time that all of this holds for, and where it is from."""
+    if drive.sample_time_from:
+        yield f"Simulated with a sample time of {drive.sample_time:g} s, {drive.sample_time_from}."
 
 
 def axes_left_out(bench: Bench, others: Bench, found: Identified) -> Iterator[str]:
@@ -31,17 +44,41 @@ def axes_left_out(bench: Bench, others: Bench, found: Identified) -> Iterator[st
         )
 
 
-def lag_of(alone: Trial, drive: Drive) -> Iterator[str]:
-    """Whether most of the error is the lag of a cascade without velocity feedforward, which no friction makes."""
-    gains = (drive.controller or drive).gains
-    if not isinstance(gains, Cascade) or gains.feed >= 1.0:
+def lag_of(plant: RigidAxis, alone: Trial, linear: Controller, drive: Drive) -> Iterator[str]:
+    """Whether most of the error is the lag of a loop without velocity feedforward, which no friction makes.
+
+    The loop that feeds the velocity tells: what it leaves on the same axis is not the lag's.
+    """
+    fed = with_velocity_fed(linear.gains)
+    if fed is None:
         return
-    lag = (1.0 - gains.feed) / gains.kv * alone.moving["speed_rms_rad_s"]
-    if lag > MOSTLY * alone.moving["position_rms_rad"]:
+    trial = run(plant, replace(linear, gains=fed), drive)
+    if isinstance(trial, str):
+        return
+    left = trial.moving["position_rms_rad"] / alone.moving["position_rms_rad"]
+    if left <= 1.0 - MOSTLY:
         yield (
-            f"Most of the error is no friction's: without velocity feedforward (feed = {gains.feed:g}) the "
-            "position lags behind by the velocity over kv; feed the velocity forward first."
+            f"Most of the error is no friction's: {lag_words(linear.gains)}; feed the velocity forward first, which "
+            f"leaves {100.0 * left:.2g} % of the error without any compensator."
         )
+
+
+def with_velocity_fed(gains: Gains | Cascade | None) -> Gains | Cascade | None:
+    """The gains with all of the reference velocity fed forward; None where it is already, or the loop has none."""
+    if isinstance(gains, Cascade):
+        return gains._replace(feed=1.0) if gains.feed < 1.0 else None
+    return gains._replace(kr=gains.kd) if gains is not None and gains.kr < gains.kd else None
+
+
+def lag_words(gains: Gains | Cascade | None) -> str:
+    """Why the position lags behind."""
+    if isinstance(gains, Cascade):
+        return f"without velocity feedforward (feed = {gains.feed:g}) the position lags behind by the velocity over kv"
+    assert gains is not None
+    return (
+        f"with kr = {gains.kr:.4g} below kd = {gains.kd:.4g} the position lags behind by (kd - kr) / kp times the "
+        "velocity"
+    )
 
 
 def weak_on(plants: Sequence[RigidAxis], drive: Drive) -> str:
@@ -80,6 +117,13 @@ def notes_on(
     if chosen is None:
         reasons = sorted({r for c in candidates for r in c.refused}) or ["none reduces the error by 5 %"]
         yield f"No compensator is recommended: {', '.join(reasons)}."
+        unsure = [c.worst for c in candidates if c.useless.startswith(UNSURE)]
+        if unsure:
+            yield (
+                f"The best safe setting leaves {100.0 * min(unsure):.1f} % of the error on the worst axis simulated; "
+                f"{ALLOWANCE:g} times that is allowed for, for what is not simulated, so that no reduction is certain above "
+                f"{100.0 / ALLOWANCE:.0f} % left."
+            )
         # Of those that go beyond the best estimate, which is simulated first.
         left = [c.errors[0] for c in candidates if len(c.errors) > 1 and c.errors[0] < 1.0]
         if unknown and left:

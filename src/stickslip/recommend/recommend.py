@@ -31,7 +31,17 @@ from stickslip.recommend.candidates import (
     on_both,
     rings_alone,
 )
-from stickslip.recommend.notes import ALLOWANCE, axes_left_out, lag_of, notes_on, weak_on
+from stickslip.recommend.notes import (
+    ALLOWANCE,
+    HARDLY,
+    UNSURE,
+    WORTH,
+    axes_left_out,
+    lag_of,
+    notes_on,
+    sampled_as,
+    weak_on,
+)
 from stickslip.recommend.plant import Plant
 from stickslip.recommend.recommendation import Recommendation
 from stickslip.recommend.refusals import held, refuse_endless, refuse_unknown, refuse_weak
@@ -45,8 +55,6 @@ LEADS = (0.0, 0.5, 1.0, 2.0)
 """In sample times."""
 DEADBAND = 1.5
 """In counts per sample time: a single count, which an axis at rest may give, is then rest."""
-WORTH = 0.95
-"""A compensator that leaves more than this part of the error is not worth its risk."""
 ALIKE = 1.02
 """As `NEAR`, for leads: the shorter one is taken."""
 
@@ -113,7 +121,7 @@ def recommend(
                 else Bench(list(plants), linear, drive, laws, account.one))  # fmt: skip
 
     bench, others = drawn(axes, seed), drawn(confirm, seed + 1)
-    first = held(found, bench.before(0), drive)
+    first = held(found, bench.before(0), drive, inertia)
     # By the axes of the confirmation, if there are more of them: what is said is then the same for any `axes`.
     rung = rings_alone(max(others, bench, key=lambda b: len(b.plants)), j, found.unit("N·m"))
     chosen, candidates, margin, unsafe_gain = picked(settings, bench, others, account)
@@ -124,7 +132,7 @@ def recommend(
         hunts = limit_cycle(chosen.setting.on(linear, laws[chosen.setting.law]), bench, 0) if chosen else ""
     account.end()
     notes = [
-        *axes_left_out(bench, others, found), *lag_of(first, drive),
+        *sampled_as(drive), *axes_left_out(bench, others, found), *lag_of(bench.plants[0], first, linear, drive),
         *notes_on(found, chosen, candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine),
     ]  # fmt: skip
     return Recommendation(
@@ -337,8 +345,10 @@ def insisted(setting: Setting, bench: Bench, others: Bench) -> tuple[Candidate, 
     final = others.judged(setting)
     if final.unsafe:
         return final, later
+    if final.worst > WORTH:
+        return replace(final, useless=f"{HARDLY}{later}"), ""
     if ALLOWANCE * final.worst > 1.0:
-        return replace(final, useless=f"hardly less error{later}"), ""
+        return replace(final, useless=UNSURE + later), ""
     if (trial := others.judged(more)).unsafe:
         return trial, guarded + later
     return final, ""

@@ -62,8 +62,10 @@ def refuse_unknown(found: Identified) -> None:
         )
 
 
-def held(found: Identified, alone: Trial | str, drive: Drive) -> Trial:
+def held(found: Identified, alone: Trial | str, drive: Drive, inertia: float | None = None) -> Trial:
     """The linear loop alone on the axis as it was identified, if it holds it: else no compensator is to blame.
+
+    `inertia` is one that was given, kg·m².
 
     Raises
     ------
@@ -78,8 +80,21 @@ def held(found: Identified, alone: Trial | str, drive: Drive) -> Trial:
     unsure = [e.name for e in found.estimates if not e.identified]
     doubt = f", which does not tell {', '.join(unsure)}," if unsure else ""
     raise InputError(
-        f"on the axis of {found.path}{doubt} the linear loop alone is unstable: {alone}; check its gains, or identify "
-        "a record with faster motion"
+        f"on the axis of {found.path}{doubt} the linear loop alone is unstable: {alone}; "
+        + (unsure_inertia(found) if inertia is None else "")
+        + "check its gains, or identify a record with faster motion"
+    )
+
+
+def unsure_inertia(found: Identified) -> str:
+    """That a loop may be unstable on the model's inertia and not on the axis's; empty where the record tells it."""
+    told = next((e for e in found.estimates if e.name == "inertia"), None)
+    if told is None or (told.identified and told.upper <= RATIO * told.lower):
+        return ""
+    unit, of = found.unit("kg·m²"), "is not identified" if not told.identified else "is hardly determined"
+    return (
+        f"the model's inertia {found.axis.get('inertia', told.value):.3g} {unit} {of} [{told.lower:.3g}, {told.upper:.3g}], and the loop may be "
+        f"stable on the axis's own: give that with --inertia in {unit} (Python: inertia=), "
     )
 
 

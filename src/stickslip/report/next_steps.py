@@ -8,12 +8,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
-from stickslip.record import Record, encoder_step
+from stickslip.record import Record, encoder_step, row_period
 from stickslip.report.after_a_map import after_a_map
 from stickslip.report.sliding_torque import beaten, sliding_of
 
@@ -120,8 +118,7 @@ def drive_in(records: Sequence[Record]) -> dict[str, str]:
     loop = loops.pop() if len(loops) == 1 else ""
     kept = [p for p in loop.split(",") if p.partition("=")[0] in OWN_LOOP]
     out = {"loop": ",".join(kept)} if kept else {"bandwidth": "10"}
-    periods = [float(np.median(np.diff(r.time))) for r in records if r.time.size > 1]
-    if periods:
+    if periods := [period for r in records if (period := row_period(r)) > 0.0]:
         out["sample_time"] = f"{min(periods):.3g}"
     counts = [counts_of(r) for r in records]
     if counts and min(counts) > 0:

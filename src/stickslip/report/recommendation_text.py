@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 from stickslip.control.learned import told
 from stickslip.model import Model
-from stickslip.recommend.recommend import WORTH, Candidate, Recommendation
+from stickslip.recommend.notes import HARDLY, WORTH
+from stickslip.recommend.recommend import Candidate, Recommendation
 
 
 def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str]:
@@ -78,7 +79,7 @@ def safety(c: Candidate) -> str:
     """Whether it is safe; why it is not, or not worth it."""
     if c.unsafe:
         return f"no: {', '.join(c.unsafe)}"
-    useless = c.useless or ("hardly less error" if c.worst > WORTH else "")
+    useless = c.useless or (HARDLY if c.worst > WORTH else "")
     return f"yes, but {useless}" if useless else "yes"
 
 

@@ -25,7 +25,7 @@ from stickslip.identify.regression.regressions import Regress, Regressions
 from stickslip.model import Model
 from stickslip.readers.convert import pendulum_before_gear
 from stickslip.readers.cut import file_rows, pieces
-from stickslip.record import Record
+from stickslip.record import Record, row_period
 from stickslip.report.identified import Source
 from stickslip.spec import Law
 from stickslip.verbs.identification import IdentificationResult
@@ -317,7 +317,11 @@ def with_loop(record: Record, loop: str) -> Record:
 def about(record: Record) -> dict[str, Any]:
     """File, hash and size of a record."""
     reading: dict[str, Any] = record.meta.get("reading", {})
-    said = {"file": str(reading.get("file", "")), "sha256": reading.get("sha256", ""), "rows": len(record)}
+    said: dict[str, Any] = {
+        "file": str(reading.get("file", "")), "sha256": reading.get("sha256", ""), "rows": len(record)
+    }  # fmt: skip
+    if period := row_period(record):
+        said["sample_time"] = period
     kept = ", ".join(f"{a}:{b}" for a, b in reading.get("kept_rows", [])[:20])
     return {**said, "rows_of_file": kept} if kept else said
 

@@ -18,6 +18,7 @@ from stickslip.control.files import read_controller
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import kind_of_loop
 from stickslip.errors import InputError, UnknownName
+from stickslip.identify.identified_file import Identified
 from stickslip.identify.motion import Motion, motion_of
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
@@ -36,6 +37,8 @@ USUAL: Mapping[str, Any] = {
     "sample_time": None,
 }
 """What `recommend` takes where nothing is given."""
+USUAL_TIME = 1e-3
+"""s, where nothing tells the sample time."""
 
 
 @arguments_checked
@@ -88,7 +91,8 @@ def recommend(
         resonances, delay, amplifier, encoder and noise, and the identified friction and inertia. Without it on rigid
         axes.
     sample_time : float, optional
-        Of the drive, s; the machine's, or 1e-3. Refused beside `controller`, which has its own.
+        Of the drive, s; the machine's, else that of the identified record, as `identify` proposes it, or 1e-3 where the
+        model does not tell it. A note says which. Refused beside `controller`, which has its own.
     counts_per_rev : float, optional
         Of the encoder; 0: exact. The machine's, or 0. Of a linear axis the counts in 2π m: 2π over the scale's step
         in m, 12.57e6 for 0.5 µm.
@@ -131,7 +135,6 @@ def recommend(
     found = identified_of(model)
     at_hand = load_machine(machine) if isinstance(machine, (str, os.PathLike)) else machine
     if at_hand is not None:
-        sample_time = at_hand.sample_time if sample_time is None and controller is None else sample_time
         counts_per_rev = at_hand.encoder.counts if counts_per_rev is None else counts_per_rev
     path = None if motion is None else motion_in(motion)
     if controller is not None:
@@ -144,9 +147,10 @@ def recommend(
         )  # fmt: skip
     else:
         gains, corner, limit = own_loop(loop, torque_limit)
+        period, told_by = sample_time_for(found, sample_time, at_hand)
         drive = Drive(
-            bandwidth, damping, 1e-3 if sample_time is None else sample_time, counts_per_rev or 0.0, limit, amplitude,
-            frequency or 0.5, linear, gains, corner, path,
+            bandwidth, damping, period, counts_per_rev or 0.0, limit, amplitude, frequency or 0.5, linear, gains,
+            corner, path, sample_time_from=told_by,
         )  # fmt: skip
     if at_hand is not None:
         most = at_hand.limits.get("torque", math.inf)
@@ -259,7 +263,22 @@ def drive_with(
     return Drive(
         sample_time=made.sample_time, encoder_counts=counts or made.encoder_counts, torque_limit=limit,
         amplitude=amplitude, frequency=frequency or 0.5, motion=motion, controller=made,
+        sample_time_from="that of the controller",
     )  # fmt: skip
+
+
+def sample_time_for(found: Identified, given: float | None, machine: Machine | None) -> tuple[float, str]:
+    """The sample time of the drive, s, and where it is from: given, the machine's, the record's, or `USUAL_TIME`."""
+    other = "where the drive's is another one, give --sample-time (Python: sample_time=)"
+    if given is not None:
+        return given, "as given"
+    if machine is not None:
+        return machine.sample_time, f"that of the machine {machine.name}"
+    period, file = found.sampled
+    if period:
+        of = f"the record {file}" if file else "the identified record"
+        return period, f"the time between the rows of {of}; {other}"
+    return USUAL_TIME, f"assumed, as the model does not tell its record's; {other}"
 
 
 def own_loop(

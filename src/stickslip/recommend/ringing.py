@@ -1,0 +1,67 @@
+"""What a linear controller's own oscillation comes from: an encoder's counts, or the loop itself.
+
+Asked by simulating the same axis with an encoder that measures exactly: what goes on there is not the counts'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.control.controller import Controller
+from stickslip.control.linear import Cascade, Gains
+from stickslip.machines.rigid import RigidAxis
+from stickslip.recommend.candidate_run import HELD, STARTS, Drive, Trial, rings, run, simulated
+from stickslip.recommend.swings import between_counts
+
+ASKED = 3
+"""Axes that are simulated with an exact encoder."""
+QUIET = 0.2
+"""Of the friction at rest: a torque for a count below it moves nothing and is no noise to speak of."""
+
+
+def swing_at_rest(plant: RigidAxis, linear: Controller, drive: Drive, alone: Trial | str) -> float:
+    """Peak to peak of the axis where it is held at rest, rad; infinite where it diverges."""
+    if isinstance(alone, str):
+        return np.inf
+    found = [float(np.ptp(alone.late))]
+    count = drive.deadband(1.0) * drive.sample_time
+    held = np.zeros((round(HELD / drive.sample_time), 3))
+    held[:, 0] = 0.5 * count
+    for start in STARTS if count > 0.0 else ():
+        position = simulated(plant, linear, held, start * count)
+        found.append(np.inf if position is None else float(np.ptp(position[position.size // 2 :])))
+    return max(found)
+
+
+def within_counts(swing: float, push: float, friction: float, drive: Drive) -> bool:
+    """Whether an oscillation at rest is no more than what no loop avoids, by a torque that nobody hears."""
+    return swing <= between_counts(drive.encoder_counts) and push < QUIET * friction
+
+
+def by_counts(plants: Sequence[RigidAxis], linear: Controller, drive: Drive) -> bool:
+    """Whether the counts make most of these axes oscillate: measured exactly, they are calm."""
+    if not drive.encoder_counts:
+        return False
+    if drive.machine is not None:
+        return True  # Its encoder is its own; what is known is the torque for a count.
+    exact, asked = replace(linear, encoder_counts=0.0), plants[:ASKED]
+    calm = [not rings(plant, exact, drive, run(plant, exact, drive)) for plant in asked]
+    return 2 * sum(calm) > len(asked)
+
+
+def integral_of(gains: Gains | Cascade) -> tuple[str, float]:
+    """Name and value of the integral gain; 0 where there is none."""
+    return ("kvi", gains.kvi) if isinstance(gains, Cascade) else ("ki", gains.ki)
+
+
+def hunting(gains: Gains | Cascade, given: bool) -> str:
+    """Cause and remedy of an integral part that hunts against friction."""
+    name, value = integral_of(gains)
+    less = f"lower {name} ({value:.4g})" if given else "take a loop without it (--linear PD)"
+    return (
+        f": not of the encoder's counts alone, so that a finer one does not end it; the integral part hunts against the "
+        f"friction at rest; {less}, or hold the integral while the error is small"
+    )

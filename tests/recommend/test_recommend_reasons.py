@@ -1,0 +1,108 @@
+"""What a recommendation says of itself: its sample time, the true reason for none, whose an oscillation is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip.control.linear import Cascade, Gains, place
+from stickslip.errors import InputError
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.identified_file import Identified
+from stickslip.identify.motion import sinusoid
+from stickslip.machines.rigid import RigidAxis
+from stickslip.model import Model
+from stickslip.recommend.candidate_run import Drive, run
+from stickslip.recommend.candidates import Bench, Candidate, Setting, rings_alone
+from stickslip.recommend.notes import UNSURE, lag_of, notes_on, sampled_as
+from stickslip.recommend.refusals import held
+from stickslip.recommend.ringing import within_counts
+from stickslip.verbs.recommend import sample_time_for
+
+INERTIA = 4e-4
+COULOMB = Model("coulomb", fc=0.05, sigma2=1e-3)
+
+
+def identified(*estimates: Estimate, period: float = 0.0) -> Identified:
+    """A model of a record with that time between its rows, s."""
+    data = ({"file": "log.csv", "rows": 9, **({"sample_time": period} if period else {})},)
+    return Identified(
+        Path("m.toml"), COULOMB, estimates, np.eye(len(estimates)), {"inertia": INERTIA}, data=data
+    )
+
+
+def test_the_sample_time_is_the_records_where_nothing_else_is_given_and_it_is_said() -> None:
+    assert sample_time_for(identified(period=5e-4), 2e-3, None) == (2e-3, "as given")
+    period, source = sample_time_for(identified(period=5e-4), None, None)
+    (said,) = sampled_as(Drive(sample_time=period, sample_time_from=source))
+    assert said.startswith(
+        "Simulated with a sample time of 0.0005 s, the time between the rows of the record log.csv;"
+    )
+    assert "--sample-time" in said
+    period, source = sample_time_for(identified(), None, None)
+    assert period == pytest.approx(1e-3)
+    assert source.startswith("assumed")
+
+
+def test_a_loop_unstable_on_an_inertia_that_is_not_identified_asks_for_the_inertia() -> None:
+    unsure = Estimate("inertia", "kg·m²", "inertia", INERTIA, math.inf, 1e-6, 1e-2, False)
+    drive = replace(Drive(), motion=sinusoid(0.1, 0.5))
+    with pytest.raises(
+        InputError, match=r"unstable.*--inertia in kg·m² \(Python: inertia=\), check its gains"
+    ):
+        held(identified(unsure), "it left", drive)
+    for found, given in ((identified(unsure), INERTIA), (identified(), None)):
+        with pytest.raises(InputError, match="unstable: it left; check its gains"):
+            held(found, "it left", drive, given)
+
+
+@pytest.mark.parametrize(
+    ("slow", "said"),
+    [(Gains(1.6, 0.0, 0.05, 0.0), "kr = 0 below kd = 0.05"), (Cascade(30.0, 0.05, 1.0, 0.0), "feed = 0")],
+)
+def test_a_lag_that_is_most_of_the_error_is_told_with_what_is_left_without_it(
+    slow: Gains | Cascade, said: str
+) -> None:
+    plant, drive = RigidAxis(INERTIA, COULOMB), Drive(gains=slow, amplitude=1.0, frequency=0.5)
+    trial = run(plant, drive.loop(INERTIA), drive)
+    assert not isinstance(trial, str)
+    (note,) = lag_of(plant, trial, drive.loop(INERTIA), drive)
+    assert said in note
+    assert "% of the error without any compensator" in note
+    fed = slow._replace(feed=1.0) if isinstance(slow, Cascade) else slow._replace(kr=slow.kd)
+    assert not list(lag_of(plant, trial, replace(drive, gains=fed).loop(INERTIA), drive))
+
+
+def test_the_allowance_for_what_is_not_simulated_is_named_where_it_decides() -> None:
+    safe = Candidate(Setting("coulomb", "feedforward", 1.0), (0.796, 0.797), (), UNSURE)
+    said = " ".join(notes_on(identified(), None, [safe]))
+    assert "no certain reduction (more than 71 % left)" in said
+    assert "leaves 79.7 % of the error on the worst axis simulated; 1.4 times that is allowed for" in said
+    assert "hardly less" not in said
+
+
+@pytest.mark.parametrize(("swing", "own"), [(1e-3, True), (1e-5, False)])
+def test_a_swing_wider_than_counts_is_the_integrals_and_no_finer_encoder_is_asked_for(
+    swing: float, own: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plant = RigidAxis(INERTIA, COULOMB)
+    monkeypatch.setattr("stickslip.recommend.candidates.rings", lambda *_: "at rest")
+    monkeypatch.setattr("stickslip.recommend.candidates.swing_at_rest", lambda *_: swing)
+    drive = Drive(gains=Gains(1.0, 8.0, 0.03, 0.03), amplitude=0.1, encoder_counts=65536.0)
+    said = rings_alone(Bench([plant], drive.loop(INERTIA), drive, {}), INERTIA, "N·m")
+    assert f"by up to {swing:.2g} rad peak to peak" in said
+    assert ("the integral part hunts" in said) is own
+    assert ("lower ki (8)" in said) is own
+    assert ("take a finer encoder" in said) is not own
+
+
+def test_what_stays_within_the_counts_by_a_small_torque_is_no_oscillation() -> None:
+    drive = Drive(encoder_counts=4096.0)
+    count = 2.0 * math.pi / 4096.0
+    assert within_counts(2.0 * count, 0.01, 0.1, drive)
+    assert not within_counts(4.0 * count, 0.01, 0.1, drive)
+    assert not within_counts(2.0 * count, 0.05, 0.1, drive)
