@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.control.linear import Cascade, Gains, place
+from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
@@ -92,7 +92,7 @@ def test_a_swing_wider_than_counts_is_the_integrals_and_no_finer_encoder_is_aske
     plant = RigidAxis(INERTIA, COULOMB)
     monkeypatch.setattr("stickslip.recommend.candidates.rings", lambda *_: "at rest")
     monkeypatch.setattr("stickslip.recommend.candidates.swing_at_rest", lambda *_: swing)
-    drive = Drive(gains=Gains(1.0, 8.0, 0.03, 0.03), amplitude=0.1, encoder_counts=65536.0)
+    drive = Drive(gains=Gains(1.0, 8.0, 0.15, 0.15), amplitude=0.1, encoder_counts=65536.0)
     said = rings_alone(Bench([plant], drive.loop(INERTIA), drive, {}), INERTIA, "N·m")
     assert f"by up to {swing:.2g} rad peak to peak" in said
     assert ("the integral part hunts" in said) is own

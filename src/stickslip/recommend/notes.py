@@ -121,8 +121,8 @@ def notes_on(
         if unsure:
             yield (
                 f"The best safe setting leaves {100.0 * min(unsure):.1f} % of the error on the worst axis simulated; "
-                f"{ALLOWANCE:g} times that is allowed for, for what is not simulated, so that no reduction is certain above "
-                f"{100.0 / ALLOWANCE:.0f} % left."
+                f"{ALLOWANCE:g} times that is allowed for, for what is not simulated, so that no reduction is certain "
+                f"above {100.0 / ALLOWANCE:.0f} % left."
             )
         # Of those that go beyond the best estimate, which is simulated first.
         left = [c.errors[0] for c in candidates if len(c.errors) > 1 and c.errors[0] < 1.0]

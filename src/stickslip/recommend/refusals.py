@@ -92,9 +92,10 @@ def unsure_inertia(found: Identified) -> str:
     if told is None or (told.identified and told.upper <= RATIO * told.lower):
         return ""
     unit, of = found.unit("kg·m²"), "is not identified" if not told.identified else "is hardly determined"
+    value = found.axis.get("inertia", told.value)
     return (
-        f"the model's inertia {found.axis.get('inertia', told.value):.3g} {unit} {of} [{told.lower:.3g}, {told.upper:.3g}], and the loop may be "
-        f"stable on the axis's own: give that with --inertia in {unit} (Python: inertia=), "
+        f"the model's inertia {value:.3g} {unit} {of} [{told.lower:.3g}, {told.upper:.3g}], and the loop may be stable "
+        f"on the axis's own: give that with --inertia in {unit} (Python: inertia=), "
     )
 
 

@@ -13,7 +13,8 @@ import numpy as np
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
 from stickslip.machines.rigid import RigidAxis
-from stickslip.recommend.candidate_run import HELD, STARTS, Drive, Trial, rings, run, simulated
+from stickslip.recommend.candidate_run import HELD, STARTS, Drive, Trial, rings, run
+from stickslip.recommend.following import simulated
 from stickslip.recommend.swings import between_counts
 
 ASKED = 3
@@ -62,6 +63,6 @@ def hunting(gains: Gains | Cascade, given: bool) -> str:
     name, value = integral_of(gains)
     less = f"lower {name} ({value:.4g})" if given else "take a loop without it (--linear PD)"
     return (
-        f": not of the encoder's counts alone, so that a finer one does not end it; the integral part hunts against the "
+        ": not of the encoder's counts alone, so that a finer one does not end it; the integral part hunts against the "
         f"friction at rest; {less}, or hold the integral while the error is small"
     )
