@@ -56,9 +56,10 @@ def refuse_unknown(found: Identified) -> None:
     levels = [e for e in found.law_estimates[0] if e.unit in ("N·m", "N")]
     if levels and not any(e.identified or 0.0 < e.upper <= RATIO * e.lower for e in levels):
         listed = ", ".join(f"{e.name} {e.value:.3g} [{e.lower:.3g}, {e.upper:.3g}]" for e in levels)
+        why = next((f": {e.verdict}" for e in levels if e.verdict), "")
         raise InputError(
             f"{found.path}: the record does not determine the friction level ({listed} {levels[0].unit}, not "
-            "identified); identify a record that slides both ways at several speeds"
+            f"identified{why}); identify a record with constant speeds, three of them at least, each in both directions"
         )
 
 
