@@ -150,14 +150,13 @@ def identify_axis(
         require_start(evidence.experiments, axis, tried, asked)
     if not plain_axis(asked) or (per_direction and "offset" not in frozen):
         evidence = replace(evidence, sliding=None)
-    automatic, given, candidates = tuple(laws) == AUTOMATIC, asked, list[Candidate]()
+    automatic, given = tuple(laws) == AUTOMATIC, asked
     if is_open(asked, tried):
         evidence = replace(evidence, exponent_open=True)
         asked, more = shown(asked, evidence.sliding, tried)
         notes = [*notes, *more]
-    if len(tried) > 1:
-        tried, candidates, more, by = worth_comparing(evidence, tried, asked, intervals, progress)
-        notes = notes if automatic else [*notes, *more]
+    tried, candidates, more, by = worth_comparing(evidence, tried, asked, intervals, progress)
+    notes = notes if automatic else [*notes, *more]
     chosen, own = tried[0], asked_of(tried[0], asked, tried)
     if candidates:
         place = chosen_of(candidates)
