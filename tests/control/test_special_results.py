@@ -15,7 +15,7 @@ import stickslip as ss
 from stickslip.machines.contact import Bearings, Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
-from stickslip.recommend.candidate_run import UNLIMITED, follow
+from stickslip.recommend.following import UNLIMITED, follow
 from stickslip.recommend.plant import laid_out
 from stickslip.rigs.loop_sample import COLUMNS, control_of
 from stickslip.rigs.rig import setpoints
@@ -166,8 +166,8 @@ def test_an_hour_at_rest_leaves_what_was_learned(row):
         path = setpoints(
             len(position), position=position, velocity=velocity, acceleration=0.0 * velocity, closed=1.0
         )
-        positions = np.empty(len(path))
-        assert follow(laid, control, path, np.empty(len(COLUMNS)), positions) == len(path)
+        positions, push = np.empty(len(path)), np.zeros(len(path))
+        assert follow(laid, control, path, push, np.empty(len(COLUMNS)), positions) == len(path)
         return positions
 
     run(*moving())

@@ -25,8 +25,9 @@ from stickslip.machines.motor import Amplifier
 from stickslip.model import Model
 from stickslip.recommend import recommend as recommending
 from stickslip.recommend.axes import plants_of
-from stickslip.recommend.candidate_run import rings, run, simulated
+from stickslip.recommend.candidate_run import rings, run
 from stickslip.recommend.candidates import Setting
+from stickslip.recommend.following import simulated
 from stickslip.recommend.plant import Plant, WholeMachine
 from stickslip.recommend.recommend import Drive, recommend, recommend_on
 
