@@ -321,17 +321,20 @@ def rings(plant: RigidAxis, linear: Controller, drive: Drive, alone: Trial | str
     beyond, resting = alone.restless(alone.swing(drive))
     if resting > BUSY:
         return "at rest"
+    for late in held_between_counts(plant, linear, drive):
+        if late is None or reversals(np.diff(late) / drive.sample_time, TRIGGER) / (0.5 * HELD) > BUSY:
+            return "at rest"
+    return "in motion" if beyond > BUSY else ""
+
+
+def held_between_counts(plant: RigidAxis, linear: Controller, drive: Drive) -> Iterator[Array | None]:
+    """Late positions of an axis that is held between two counts, from near there, rad; None where it diverges."""
     count = drive.deadband(1.0) * drive.sample_time
     held = np.zeros((round(HELD / drive.sample_time), 3))
     held[:, 0] = 0.5 * count
     for start in STARTS if count > 0.0 else ():
         position = simulated(plant, linear, held, start * count)
-        if position is None:
-            return "at rest"
-        late = np.diff(position[position.size // 2 :]) / drive.sample_time
-        if reversals(late, TRIGGER) / (0.5 * HELD) > BUSY:
-            return "at rest"
-    return "in motion" if beyond > BUSY else ""
+        yield None if position is None else position[position.size // 2 :]
 
 
 def dangers(before: Trial, after: Trial, drive: Drive, feedforward: bool = False) -> Iterator[str]:

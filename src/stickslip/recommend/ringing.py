@@ -13,8 +13,7 @@ import numpy as np
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
 from stickslip.machines.rigid import RigidAxis
-from stickslip.recommend.candidate_run import HELD, STARTS, Drive, Trial, rings, run
-from stickslip.recommend.following import simulated
+from stickslip.recommend.candidate_run import Drive, Trial, held_between_counts, rings, run
 from stickslip.recommend.swings import between_counts
 
 ASKED = 3
@@ -27,14 +26,10 @@ def swing_at_rest(plant: RigidAxis, linear: Controller, drive: Drive, alone: Tri
     """Peak to peak of the axis where it is held at rest, rad; infinite where it diverges."""
     if isinstance(alone, str):
         return np.inf
-    found = [float(np.ptp(alone.late))]
-    count = drive.deadband(1.0) * drive.sample_time
-    held = np.zeros((round(HELD / drive.sample_time), 3))
-    held[:, 0] = 0.5 * count
-    for start in STARTS if count > 0.0 else ():
-        position = simulated(plant, linear, held, start * count)
-        found.append(np.inf if position is None else float(np.ptp(position[position.size // 2 :])))
-    return max(found)
+    found = held_between_counts(plant, linear, drive)
+    return max(
+        float(np.ptp(alone.late)), *(np.inf if late is None else float(np.ptp(late)) for late in found), 0.0
+    )
 
 
 def within_counts(swing: float, push: float, friction: float, drive: Drive) -> bool:
