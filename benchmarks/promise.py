@@ -7,9 +7,9 @@ Every axis is one of `ordinary_logs.py`, of which the package knows nothing but 
 moves, sine, staircase or tuning steps, and by chance cogging, backlash, a flexible drivetrain or friction that
 differs by direction.
 `identify` reads the log as it is; `recommend` is asked for a loop that a person would set on this axis
-(P-PI cascade, PID or PD) and for a motion (production moves, slow sine, staircase); the setting is exported as C,
-compiled, and added to the loop's torque on the generator's own machine. Printed is whether the part of the RMS error
-that it takes away lies in the promised interval, and whether any setting is worse than none.
+(P-PI cascade, PID or PD, at 1 kHz) and for a motion (production moves, slow sine, staircase); the setting is exported
+as C, compiled, and added to the loop's torque on the generator's own machine. Printed is whether the part of the RMS
+error that it takes away lies in the promised interval, and whether any setting is worse than none.
 
 Where nothing is recommended, the same machine shows what a plain feedforward of the true numbers (inertia, Coulomb,
 viscous, constant torque; gain 0.8) would have done: whether the refusal was right.
@@ -271,7 +271,7 @@ def asked(
     return json.loads(
         stickslip(
             "recommend", folder / "model.toml", "--loop", text, "--motion", folder / "motion.csv", "--counts-per-rev",
-            counts, "--out", folder / "recommended.toml", "--force", "--json", *more,
+            counts, "--sample-time", T, "--out", folder / "recommended.toml", "--force", "--json", *more,
         )
     )  # fmt: skip
 

@@ -21,7 +21,7 @@ from stickslip.recommend.candidates import Bench, Candidate, Setting, rings_alon
 from stickslip.recommend.notes import UNSURE, lag_of, notes_on, sampled_as
 from stickslip.recommend.refusals import held
 from stickslip.recommend.ringing import within_counts
-from stickslip.verbs.recommend import sample_time_for
+from stickslip.recommend.sampling import ROWS, sample_time_for, sensitivity
 
 INERTIA = 4e-4
 COULOMB = Model("coulomb", fc=0.05, sigma2=1e-3)
@@ -35,17 +35,41 @@ def identified(*estimates: Estimate, period: float = 0.0) -> Identified:
     )
 
 
+def drive_of(period: float, told_by: str = "") -> Drive:
+    """A drive whose loop is critically damped at 15 Hz."""
+    return Drive(15.0, sample_time=period, sample_time_from=told_by, amplitude=1.0)
+
+
 def test_the_sample_time_is_the_records_where_nothing_else_is_given_and_it_is_said() -> None:
-    assert sample_time_for(identified(period=5e-4), 2e-3, None) == (2e-3, "as given")
-    period, source = sample_time_for(identified(period=5e-4), None, None)
-    (said,) = sampled_as(Drive(sample_time=period, sample_time_from=source))
+    assert sample_time_for(identified(period=5e-4), 2e-3, None, drive_of) == (2e-3, "as given")
+    drive = drive_of(*sample_time_for(identified(period=5e-4), None, None, drive_of, INERTIA))
+    (said,) = sampled_as(drive, None)
     assert said.startswith(
         "Simulated with a sample time of 0.0005 s, the time between the rows of the record log.csv;"
     )
     assert "--sample-time" in said
-    period, source = sample_time_for(identified(), None, None)
+    period, source = sample_time_for(identified(), None, None, drive_of)
     assert period == pytest.approx(1e-3)
-    assert source.startswith("assumed")
+    assert source.startswith("assumed, as the model does not tell")
+
+
+@pytest.mark.parametrize(("period", "kept"), [(2e-3, True), (3e-3, True), (5e-3, False), (0.03, False)])
+def test_a_loop_hardly_damped_at_its_records_rows_runs_faster_than_they_were_kept(
+    period: float, kept: bool
+) -> None:
+    drive = drive_of(*sample_time_for(identified(period=period), None, None, drive_of, INERTIA))
+    assert drive.sample_time == pytest.approx(period if kept else 1e-3)
+    assert drive.sample_time_from.startswith(ROWS if kept else f"assumed: sampled every {period:.3g} s")
+    asked = [note for note in sampled_as(drive, None) if note.startswith("A loop that is sampled more often")]
+    assert len(asked) == kept
+
+
+@pytest.mark.parametrize("damping", [0.2, 0.3, 0.5])
+def test_the_sensitivity_of_a_loop_that_is_sampled_often_is_the_textbooks(damping: float) -> None:
+    fast = Drive(15.0, damping, 1e-4, amplitude=1.0).loop(INERTIA)
+    peak = 1.0 / (2.0 * damping * math.sqrt(1.0 - damping**2))  # Of s² / (s² + 2 D s + 1).
+    assert sensitivity(fast, INERTIA) == pytest.approx(peak, rel=0.02)
+    assert sensitivity(replace(fast, sample_time=0.05), INERTIA) == math.inf
 
 
 def test_a_loop_unstable_on_an_inertia_that_is_not_identified_asks_for_the_inertia() -> None:

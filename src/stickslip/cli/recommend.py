@@ -69,7 +69,8 @@ def drive_arguments(parser: argparse.ArgumentParser) -> None:
         "--sample-time",
         type=float,
         metavar="S",
-        help="sample time of the drive (default the machine's, else that of the identified record, or 0.001)",
+        help="sample time of the drive (default the machine's, else the time between rows of the identified "
+        "record, or 0.001 where the loop would be hardly damped at those)",
     )
     parser.add_argument(
         "--counts-per-rev",

@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import InputError, UnknownName
 
+USUAL_TIME = 1e-3
+"""s, sample time of a drive's loop where nothing tells it."""
 CASCADE_ONLY = tuple(name for name in Cascade._fields if name not in Gains._fields)
 
 

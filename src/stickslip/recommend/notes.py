@@ -7,11 +7,13 @@ from dataclasses import replace
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
+from stickslip.control.own_loop import USUAL_TIME
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.recommend.candidate_run import Drive, Trial, run
 from stickslip.recommend.candidates import Bench, Candidate, resistance
+from stickslip.recommend.sampling import ROWS
 
 MOSTLY = 0.5
 """Of the error: what a lag makes beyond that is most of it."""
@@ -25,10 +27,15 @@ UNSURE = f"no certain reduction (more than {100.0 / ALLOWANCE:.0f} % left)"
 """Why a safe setting is not worth it."""
 
 
-def sampled_as(drive: Drive) -> Iterator[str]:
+def sampled_as(drive: Drive, chosen: Candidate | None) -> Iterator[str]:
     """The sample time that all of this holds for, and where it is from."""
     if drive.sample_time_from:
         yield f"Simulated with a sample time of {drive.sample_time:g} s, {drive.sample_time_from}."
+    if chosen is None and drive.sample_time_from.startswith(ROWS) and drive.sample_time > USUAL_TIME:
+        yield (
+            "A loop that is sampled more often than its record was kept may bear a compensator where this one does "
+            "not: give its sample time (--sample-time)."
+        )
 
 
 def axes_left_out(bench: Bench, others: Bench, found: Identified) -> Iterator[str]:

@@ -132,7 +132,8 @@ def recommend(
         hunts = limit_cycle(chosen.setting.on(linear, laws[chosen.setting.law]), bench, 0) if chosen else ""
     account.end()
     notes = [
-        *sampled_as(drive), *axes_left_out(bench, others, found), *lag_of(bench.plants[0], first, linear, drive),
+        *sampled_as(drive, chosen), *axes_left_out(bench, others, found),
+        *lag_of(bench.plants[0], first, linear, drive),
         *notes_on(found, chosen, candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine),
     ]  # fmt: skip
     return Recommendation(

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stickslip.control.linear import Cascade, Gains
+from stickslip.control.own_loop import USUAL_TIME
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
 from stickslip.record import Record, encoder_step, row_period
@@ -100,7 +101,8 @@ def forward(found: Identification, records: Sequence[Record], model_file: str) -
     arguments = ", ".join(f"{n}={x!r}" if n == "loop" else f"{n}={x}" for n, x in drive.items())
     return [
         Step(
-            "Find the compensator that is safe to switch on, with your drive's loop and sample time in place of these"
+            "Find the compensator that is safe to switch on, with your drive's loop and sample time "
+            f"{'in place of these' if 'sample_time' in drive else '(--sample-time) besides'}"
             f"{', counts being those of 2π m' if is_linear(records) and 'counts_per_rev' in drive else ''}:",
             f"stickslip recommend {model} {options} --out {setting}",
             f"advice = ss.recommend(found, {arguments})",
@@ -118,7 +120,10 @@ def drive_in(records: Sequence[Record]) -> dict[str, str]:
     loop = loops.pop() if len(loops) == 1 else ""
     kept = [p for p in loop.split(",") if p.partition("=")[0] in OWN_LOOP]
     out = {"loop": ",".join(kept)} if kept else {"bandwidth": "10"}
-    if periods := [period for r in records if (period := row_period(r)) > 0.0]:
+    periods = [period for r in records if (period := row_period(r)) > 0.0]
+    if (
+        periods and min(periods) <= USUAL_TIME
+    ):  # A slower record may have been kept more rarely than the loop ran.
         out["sample_time"] = f"{min(periods):.3g}"
     counts = [counts_of(r) for r in records]
     if counts and min(counts) > 0:

@@ -18,13 +18,13 @@ from stickslip.control.files import read_controller
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import kind_of_loop
 from stickslip.errors import InputError, UnknownName
-from stickslip.identify.identified_file import Identified
 from stickslip.identify.motion import Motion, motion_of
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
 from stickslip.readers.reading import read
 from stickslip.recommend import recommend as setting
 from stickslip.recommend.candidate_run import Drive
+from stickslip.recommend.sampling import sample_time_for
 from stickslip.verbs.compare import IdentifiedModel, identified_of
 from stickslip.verbs.reading import Log, open_log
 from stickslip.verbs.recommendation import RecommendationResult
@@ -37,8 +37,6 @@ USUAL: Mapping[str, Any] = {
     "sample_time": None,
 }
 """What `recommend` takes where nothing is given."""
-USUAL_TIME = 1e-3
-"""s, where nothing tells the sample time."""
 
 
 @arguments_checked
@@ -91,8 +89,9 @@ def recommend(
         resonances, delay, amplifier, encoder and noise, and the identified friction and inertia. Without it on rigid
         axes.
     sample_time : float, optional
-        Of the drive, s; the machine's, else that of the identified record, as `identify` proposes it, or 1e-3 where the
-        model does not tell it. A note says which. Refused beside `controller`, which has its own.
+        Of the drive, s; the machine's, else the time between the rows of the identified record, or 1e-3 where the model
+        does not tell it, or the loop would be hardly damped at those rows. A note says which. Refused beside
+        `controller`, which has its own.
     counts_per_rev : float, optional
         Of the encoder; 0: exact. The machine's, or 0. Of a linear axis the counts in 2π m: 2π over the scale's step
         in m, 12.57e6 for 0.5 µm.
@@ -147,11 +146,15 @@ def recommend(
         )  # fmt: skip
     else:
         gains, corner, limit = own_loop(loop, torque_limit)
-        period, told_by = sample_time_for(found, sample_time, at_hand)
-        drive = Drive(
-            bandwidth, damping, period, counts_per_rev or 0.0, limit, amplitude, frequency or 0.5, linear, gains,
-            corner, path, sample_time_from=told_by,
-        )  # fmt: skip
+
+        def sampled(period: float, told_by: str = "") -> Drive:
+            return Drive(
+                bandwidth, damping, period, counts_per_rev or 0.0, limit, amplitude, frequency or 0.5, linear, gains,
+                corner, path, sample_time_from=told_by,
+            )  # fmt: skip
+
+        known_inertia = inertia or found.axis.get("inertia")
+        drive = sampled(*sample_time_for(found, sample_time, at_hand, sampled, known_inertia))
     if at_hand is not None:
         most = at_hand.limits.get("torque", math.inf)
         drive = replace(drive, machine=at_hand, torque_limit=min(drive.torque_limit, most))
@@ -265,20 +268,6 @@ def drive_with(
         amplitude=amplitude, frequency=frequency or 0.5, motion=motion, controller=made,
         sample_time_from="that of the controller",
     )  # fmt: skip
-
-
-def sample_time_for(found: Identified, given: float | None, machine: Machine | None) -> tuple[float, str]:
-    """The sample time of the drive, s, and where it is from: given, the machine's, the record's, or `USUAL_TIME`."""
-    other = "where the drive's is another one, give --sample-time (Python: sample_time=)"
-    if given is not None:
-        return given, "as given"
-    if machine is not None:
-        return machine.sample_time, f"that of the machine {machine.name}"
-    period, file = found.sampled
-    if period:
-        of = f"the record {file}" if file else "the identified record"
-        return period, f"the time between the rows of {of}; {other}"
-    return USUAL_TIME, f"assumed, as the model does not tell its record's; {other}"
 
 
 def own_loop(

@@ -1,0 +1,97 @@
+"""How often a drive's loop is sampled, where nobody says it: as often as its record has rows, unless it cannot be.
+
+A record may keep fewer rows than the loop takes samples. A loop that somebody runs is well damped; one that would not
+be, were it sampled only once a row, is sampled more often.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.analyse.controller_loop import linearised
+from stickslip.control.controller import Controller
+from stickslip.control.own_loop import USUAL_TIME
+from stickslip.identify.identified_file import Identified
+from stickslip.machines.machine import Machine
+from stickslip.recommend.candidate_run import Drive
+
+WELL_DAMPED = 2.0
+"""Greatest sensitivity of loops as people set them: 1.2 to 2 (Åström and Hägglund, Advanced PID Control, 2006)."""
+POINTS = 500
+"""Frequencies up to half the sample rate, over five decades."""
+MIDDLE = 10.0
+"""Hz; a linear loop is the same at every frequency."""
+
+ROWS = "the time between the rows of"
+OWN = "where the drive's is another one, give --sample-time (Python: sample_time=)"
+
+
+def sample_time_for(
+    found: Identified, given: float | None, machine: Machine | None, sampled: Callable[[float], Drive],
+    inertia: float | None = None,
+) -> tuple[float, str]:  # fmt: skip
+    """The sample time of the drive, s, and where it is from: given, the machine's, the record's, or `USUAL_TIME`.
+
+    Parameters
+    ----------
+    found : Identified
+    given : float, optional
+        s
+    machine : Machine, optional
+        At hand.
+    sampled : callable
+        The drive with a sample time, s.
+    inertia : float, optional
+        kg·m², which tells whether the loop can have the record's sample time.
+    """
+    if given is not None:
+        return given, "as given"
+    if machine is not None:
+        return machine.sample_time, f"that of the machine {machine.name}"
+    period, file = found.sampled
+    if not period:
+        return USUAL_TIME, f"assumed, as the model does not tell its record's; {OWN}"
+    record = f"the record {file}" if file else "the identified record"
+    if period > USUAL_TIME and inertia:
+        # Gains do not depend on it, and a bandwidth that is too high for it is no error yet.
+        loop = replace(sampled(USUAL_TIME).loop(inertia), sample_time=period)
+        if not sensitivity(loop, inertia) <= WELL_DAMPED:
+            return USUAL_TIME, (
+                f"assumed: sampled every {period:.3g} s, as {record} has rows, this loop would be unstable or hardly "
+                f"damped, so that it is taken to run faster than the record was kept; {OWN}"
+            )
+    return period, f"{ROWS} {record}; {OWN}"
+
+
+def sensitivity(loop: Controller, inertia: float) -> float:
+    """Greatest magnitude of 1 / (1 + L) of a sampled loop on a rigid axis; infinite where it is unstable.
+
+    Parameters
+    ----------
+    loop : Controller
+        Linear, and sampled.
+    inertia : float
+        kg·m² (kg); the axis is that alone, with the torque held over a sample.
+
+    Raises
+    ------
+    InputError
+        If a law of the loop is not smooth about rest.
+    """
+    linear, t = linearised(loop, math.inf, MIDDLE), loop.sample_time
+    a, b, c, d = (np.asarray(x, dtype=float) for x in linear.state_space())
+    b, c = b.reshape(-1, 1), c.reshape(1, -1)
+    free: Any = np.array([[1.0, t], [0.0, 1.0]])
+    pushed, seen = np.array([[0.5 * t * t], [t]]) / inertia, np.array([[1.0, 0.0]])
+    closed = np.block([[free + float(d) * pushed @ seen, pushed @ c], [b @ seen, a]])
+    if np.abs(np.linalg.eigvals(closed)).max() > 1.0 + 1e-9:
+        return math.inf
+    angle = np.geomspace(1e-5 * math.pi, math.pi, POINTS)
+    z = np.exp(1j * angle)
+    axis = 0.5 * t * t / inertia * (z + 1.0) / (z - 1.0) ** 2
+    return float(np.abs(1.0 / (1.0 - axis * linear.response(angle / (2.0 * math.pi * t)))).max())
