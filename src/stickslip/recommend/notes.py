@@ -111,6 +111,24 @@ def notes_on(
             "is left once gravity sin(q - gravity_angle) of the model is added to the drive's torque."
         )
     unknown = [e.name for e in found.estimates if not e.identified]
+    yield from _intervals(found, unknown)
+    if chosen is None:
+        yield from _none(candidates, unknown)
+        return
+    stiffer = [c for c in candidates if c.setting.kind == "feedback" and c.setting.gain == 1.0 and c.unsafe]
+    if stiffer:
+        yield f"Feedback at gain 1 is not safe: {', '.join(stiffer[0].unsafe)}."
+    if abs(float(found.axis.get("offset", 0.0))) > 0.0:
+        offset = f"{float(found.axis['offset']):.4g} {found.unit('N·m')}"
+        yield (
+            f"A constant torque of {offset} acts in addition to friction: it is part of what is recommended, "
+            "simulated and exported."
+        )
+    yield _simulated(machine)
+
+
+def _intervals(found: Identified, unknown: Sequence[str]) -> Iterator[str]:
+    """What the sampled axes cover of the numbers that the record does not tell."""
     if not found.law_estimates[0]:
         yield "The law has no intervals: only its best estimate was simulated, and nothing is said about its error."
     elif unknown:
@@ -121,35 +139,31 @@ def notes_on(
             f"Not identified: {', '.join(unknown)}; the sampled axes cover at most a factor of 9 to each side for them"
             f"{static}."
         )
-    if chosen is None:
-        reasons = sorted({r for c in candidates for r in c.refused}) or ["none reduces the error by 5 %"]
-        yield f"No compensator is recommended: {', '.join(reasons)}."
-        unsure = [c.worst for c in candidates if c.useless.startswith(UNSURE)]
-        if unsure:
-            yield (
-                f"The best safe setting leaves {100.0 * min(unsure):.1f} % of the error on the worst axis simulated; "
-                f"{ALLOWANCE:g} times that is allowed for, for what is not simulated, so that no reduction is certain "
-                f"above {100.0 / ALLOWANCE:.0f} % left."
-            )
-        # Of those that go beyond the best estimate, which is simulated first.
-        left = [c.errors[0] for c in candidates if len(c.errors) > 1 and c.errors[0] < 1.0]
-        if unknown and left:
-            yield (
-                f"On the best estimate {100.0 * min(left):.0f} % of the error would be left; other axes that the "
-                f"record allows decide, since it does not tell {', '.join(unknown)}: what to record for them stands in "
-                "the model file (measure_next)."
-            )
-        return
-    stiffer = [c for c in candidates if c.setting.kind == "feedback" and c.setting.gain == 1.0 and c.unsafe]
-    if stiffer:
-        yield f"Feedback at gain 1 is not safe: {', '.join(stiffer[0].unsafe)}."
-    if abs(float(found.axis.get("offset", 0.0))) > 0.0:
-        offset = f"{float(found.axis['offset']):.4g} {found.unit('N·m')}"
+
+
+def _none(candidates: Sequence[Candidate], unknown: Sequence[str]) -> Iterator[str]:
+    """Why no compensator is recommended."""
+    reasons = sorted({r for c in candidates for r in c.refused}) or ["none reduces the error by 5 %"]
+    yield f"No compensator is recommended: {', '.join(reasons)}."
+    unsure = [c.worst for c in candidates if c.useless.startswith(UNSURE)]
+    if unsure:
         yield (
-            f"A constant torque of {offset} acts in addition to friction: it is part of what is recommended, "
-            "simulated and "
-            "exported."
+            f"The best safe setting leaves {100.0 * min(unsure):.1f} % of the error on the worst axis simulated; "
+            f"{ALLOWANCE:g} times that is allowed for, for what is not simulated, so that no reduction is certain "
+            f"above {100.0 / ALLOWANCE:.0f} % left."
         )
+    # Of those that go beyond the best estimate, which is simulated first.
+    left = [c.errors[0] for c in candidates if len(c.errors) > 1 and c.errors[0] < 1.0]
+    if unknown and left:
+        yield (
+            f"On the best estimate {100.0 * min(left):.0f} % of the error would be left; other axes that the "
+            f"record allows decide, since it does not tell {', '.join(unknown)}: what to record for them stands in "
+            "the model file (measure_next)."
+        )
+
+
+def _simulated(machine: Machine | None) -> str:
+    """What was simulated, what was not, and how the interval allows for that."""
     simulated = (
         "Simulated with a rigid axis, a current loop, up to a sample of delay, friction that comes late as "
         "behind an elastic drivetrain, and torques over the position as large as the model's misfit; resonances, "
@@ -160,7 +174,7 @@ def notes_on(
             f"Simulated on the machine {machine.name}, with its resonances, delay, amplifier, encoder and noise, and "
             "friction that comes late as behind backlash; what the machine's file leaves out is not in it: for that"
         )
-    yield (
+    return (
         f"{simulated} the interval takes the error left as up to {ALLOWANCE:g} times as large and down to {BETTER:g} "
         "times as small."
     )
