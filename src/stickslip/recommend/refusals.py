@@ -18,6 +18,8 @@ AT_THE_LOAD = (
     "; this model, --loop and the limit are in kg and N: 1 N·m of a motor at a lead of P metres is 2 pi / P N"
 )
 """Of a torque limit that is too low for a linear axis: it may be the motor's own, in N·m."""
+WITHIN = 5.0
+"""From the lower to the upper end of friction's level at most, for a setting to be looked for."""
 LOST = 2.0
 """RMS error of the linear controller alone, in parts of the motion's RMS, from which on it does not hold the axis: one
 that friction keeps from moving at all has 1."""
@@ -46,15 +48,15 @@ def refuse_weak(found: Identified, drive: Drive) -> None:
 
 
 def refuse_unknown(found: Identified) -> None:
-    """Refuse a law whose level the record does not tell to a factor of `RATIO`: what is fed forward would be one choice
-    among many. A setting that helps on every axis within that factor is none.
+    """Refuse a law whose level the record does not tell to a factor of `WITHIN`: what is fed forward would be one
+    choice among many. Within that factor the sampled axes decide: what helps on every one of them is safe.
 
     Raises
     ------
     InputError
     """
     levels = [e for e in found.law_estimates[0] if e.unit in ("N·m", "N")]
-    if levels and not any(e.identified or 0.0 < e.upper <= RATIO * e.lower for e in levels):
+    if levels and not any(e.identified or 0.0 < e.upper <= WITHIN * e.lower for e in levels):
         listed = ", ".join(f"{e.name} {e.value:.3g} [{e.lower:.3g}, {e.upper:.3g}]" for e in levels)
         why = next((f": {e.verdict}" for e in levels if e.verdict), "")
         raise InputError(
