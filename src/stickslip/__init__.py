@@ -1,9 +1,9 @@
 """stickslip: friction of servo axes, simulated under control and compensated.
 
 From a log to a compensator: `read`, `doctor`, `identify`, `compare`, `recommend`, `export`. Simulation: `Model`,
-`RigidAxis`, `load_machine`, `Controller`, `Reference`, `simulate`, `respond`. Many runs: `sweep`, `tune`, `learn`. Each
-has its own help, `help(stickslip.identify)`; `identify`, `recommend`, `export` and `sweep` are packages as well, and so
-stand under PACKAGE CONTENTS rather than FUNCTIONS.
+`RigidAxis`, `load_machine`, `Controller`, `Reference`, `simulate`, `respond`, `stability`. Many runs: `study`, `sweep`,
+`tune`, `learn`. Each has its own help, `help(stickslip.identify)`; `identify`, `recommend`, `export`, `study` and
+`sweep` are packages as well, and so stand under PACKAGE CONTENTS rather than FUNCTIONS.
 
 The public names below are loaded when first used, so that importing the package costs nothing.
 """
@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from stickslip.verbs.reading import read
     from stickslip.verbs.recommend import recommend
     from stickslip.verbs.recommendation import RecommendationResult
+    from stickslip.verbs.stability import stability
+    from stickslip.verbs.study import study
     from stickslip.verbs.sweep import SweepResult, sweep
     from stickslip.verbs.tune import tune
 
@@ -74,6 +76,7 @@ _HOME = {
         "verbs.learn": "LearningResult learn",
         "verbs.reading": "read",
         "verbs.recommendation": "RecommendationResult",
+        "verbs.stability": "stability",
         "verbs.sweep": "SweepResult",
         "verbs.tune": "tune",
     }.items()
@@ -124,12 +127,14 @@ __all__ = [
     "recommend",
     "respond",
     "simulate",
+    "stability",
+    "study",
     "sweep",
     "tune",
 ]
 
 
-_ROOMS = {name: f"verbs.{name}" for name in ("export", "identify", "recommend", "sweep")}
+_ROOMS = {name: f"verbs.{name}" for name in ("export", "identify", "recommend", "study", "sweep")}
 """Functions with the name of a package that holds more (docs/decisions/0023)."""
 
 

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.analyse.controller_margins import ControllerStability
 from stickslip.config import Document, Table
 from stickslip.export import target_named
 from stickslip.identify.compare.change import Comparison
@@ -30,6 +31,7 @@ from stickslip.verbs import learn
 from stickslip.verbs.reading import Reading
 
 SWEEPS = Path(__file__).parents[1] / "sweep"
+STUDY = Path(__file__).parents[1] / "data" / "small_study.toml"
 WILD: dict[str, Any] = {
     "3": 3, "2.5": 2.5, "foo": "foo", "None": None, "object": object(), "list": [1, "a"], "dict": {},
 }  # fmt: skip
@@ -170,6 +172,8 @@ def calls() -> dict[str, Call]:
         "recommend": Call(ss.recommend, {"model": "a.toml", "amplitude": 0.1}),
         "respond": Call(ss.respond, {"model": LAW, "reference": SINE, "times": [0.0, 0.1]}),
         "simulate": Call(ss.simulate, RUNS),
+        "stability": Call(ss.stability, {"machine": "thesis-dry", "controller": SAMPLED}),
+        "study": Call(ss.study, {"file": STUDY}),
         "sweep": Call(ss.sweep, {"file": SWEEPS / "small.toml"}),
         "tune": Call(ss.tune, {"file": SWEEPS / "small_tune.toml"}),
     }  # fmt: skip
@@ -178,7 +182,8 @@ def calls() -> dict[str, Call]:
 CALLS = calls()
 RESULTS = (
     ss.ControlBlock, ss.Controller, ss.ExportResult, ss.IdentificationResult, ss.LearningResult, ss.Machine, ss.Model,
-    ss.RecommendationResult, ss.Record, ss.Reference, ss.RigidAxis, ss.SweepResult, Comparison, Diagnosis, Tuned,
+    ss.RecommendationResult, ss.Record, ss.Reference, ss.RigidAxis, ss.SweepResult, Comparison, ControllerStability,
+    Diagnosis, Tuned,
 )  # fmt: skip
 
 
@@ -205,7 +210,7 @@ def _no_work(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
     for place in (
         "verbs.identify.identified", "verbs.doctor.examine",
-        "verbs.compare.read_identified", "verbs.sweep.execute.run", "verbs.tune.search",
+        "verbs.compare.read_identified", "verbs.sweep.execute.run", "verbs.tune.search", "verbs.study.studies.run",
         "verbs.learn._over_time", "verbs.learn._over_angle", "verbs.identification.prepared_folder",
         "verbs.recommendation.prepared_folder", "verbs.learn.prepared_folder", "verbs.export.prepared_folder",
         "verbs.identification.answers_of", "verbs.sweep.dataset.read",

@@ -234,6 +234,9 @@ def _about_rest(controller: Controller, amplitude: float, frequency: float) -> _
 
 def moved_and_felt(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array]:
     """The part of a system that its input moves and its output feels."""
+    # What is never felt goes by its name first: mixed with the rest, rounding would be felt of it.
+    felt = _sizes(a.T, c.T) > 0.0
+    a, b, c = a[np.ix_(felt, felt)], b[felt], c[:, felt]
     for _ in range(2):  # the second time of the transposed system, which turns it back too
         sizes = _sizes(a, b)
         moves = sizes > 0.0
@@ -249,26 +252,26 @@ def _sizes(a: Array, b: Array) -> Array:
     """The largest value of every number after an impulse, shape (n,)."""
     x, largest = b[:, 0], np.abs(b[:, 0])
     for _ in range(LONG):
+        if not float(largest.max(initial=0.0)) < 1e100:
+            break
         x = a @ x
         largest = np.maximum(largest, np.abs(x))
-        if not float(largest.max()) < 1e100:
-            break
     return largest
 
 
 def _krylov(a: Array, b: Array) -> Array:
     """An orthonormal base of what b, A b, A A b, ... span, shape (n, rank)."""
     base = np.zeros((len(a), 0))
-    v = b[:, 0]
+    v, size = b[:, 0], float(np.linalg.norm(b))
+    largest = float(np.linalg.norm(a))  # What A makes of a unit vector may be nothing but rounding.
     while base.shape[1] < len(a):
-        size = float(np.linalg.norm(v))
         for _ in range(2):  # once is not enough to full precision
             v = v - base @ (base.T @ v)
         left = float(np.linalg.norm(v))
         if not left > SPANNED * size or left == 0.0:
             break
         base = np.column_stack([base, v / left])
-        v = a @ base[:, -1]
+        v, size = a @ base[:, -1], largest
     return base
 
 

@@ -62,7 +62,7 @@ class LoopMargins:
         return f"{self.name:<10}{verdict:<10}{pole}  {f'{least} to {most}':>14}{late:>16}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ControllerStability:
     """A controller on a machine.
 
@@ -105,6 +105,12 @@ class ControllerStability:
         """The largest motion that is spoken of, rad: the small one, or what it grows to."""
         return reach_of(self.amplitude, self.cycle)
 
+    def _contact(self) -> str:
+        """What holds the axis while it sticks, in words."""
+        if self.stiffness == 0.0:
+            return "a contact without springs, which holds the axis where it sticks"
+        return f"contact {self.stiffness:.1f} N·m/rad"
+
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {
@@ -122,17 +128,20 @@ class ControllerStability:
             "gain": np.abs(self.response).tolist(), "phase": np.unwrap(np.angle(self.response)).tolist(),
         }  # fmt: skip
 
+    def __repr__(self) -> str:
+        return "\n".join(["<ControllerStability:", *(f"  {line}" for line in self.lines())]) + ">"
+
     def lines(self) -> Iterator[str]:
         """What people read."""
         yield f"controller: {'; '.join(self.laws)}"
         yield (
             f"sample time {1e3 * self.sample_time:g} ms, velocity {1e3 * self.estimator_delay:.3g} ms late; motion of "
-            f"{1e6 * self.amplitude:.3g} µrad at the encoder, contact {self.stiffness:.1f} N·m/rad"
+            f"{1e6 * self.amplitude:.3g} µrad at the encoder, {self._contact()}"
         )
         yield f"{'':<10}{'':<10}{'least stable pole':<22}{'torque times':>16}{'samples later':>16}"
         for loop in self.loops:
             yield loop.line()
-        if math.isfinite(self.softer):
+        if math.isfinite(self.softer) and self.stiffness > 0.0:
             yield f"sticking, {100.0 * self.softer:.0f} % of the contact may be missing"
         if self.cycle:
             yield (

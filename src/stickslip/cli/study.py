@@ -12,7 +12,6 @@ interruption the same command resumes, and runs that --only leaves out stay in t
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,10 +63,9 @@ def run(args: argparse.Namespace) -> int:
 
         return _bench.run(args)
     from stickslip.cli import _output
-    from stickslip.study import study as studies
-    from stickslip.study.plan import select
+    from stickslip.verbs.study import chosen, study_of
 
-    study = studies.load(args.study, given=_given(args))
+    study = study_of(args.study, args.seeds, not args.no_ablation)
     if args.print:
         print(study.source.read_text(encoding="utf-8"), end="")
         return 0
@@ -75,24 +73,10 @@ def run(args: argparse.Namespace) -> int:
     if only is not None and not all(only):
         raise InputError(f"--only {args.only!r} has an empty part; give names like low,step")
     result, report = _ran(study, only, args)
-    # The folder may hold more of the study than was asked for; only that is shown.
-    chosen = {p.key for p in select([*study.runs, *study.extras], only or ())}
-    shown = replace(
-        result,
-        runs=[r for r in result.runs if r.key in chosen],
-        extras=[r for r in result.extras if r.key in chosen],
-    )
+    shown = chosen(result, study, only or ())
     _show(shown, report, len(result.runs), args.json)
     failed = [r for r in (*shown.runs, *shown.extras) if r.failure]
     return _output.report_failures([(r.key, r.failure, r.path) for r in failed])
-
-
-def _given(args: argparse.Namespace) -> dict[str, Any]:
-    """What the options say of experiments instead of the study's file."""
-    if args.seeds is not None and args.seeds < 0:
-        raise InputError(f"--seeds {args.seeds} must be 0 or more")
-    seeds = {} if args.seeds is None else {"seeds": args.seeds}
-    return seeds | ({"ablation": False} if args.no_ablation else {})
 
 
 def _ran(study: Study, only: list[str] | None, args: argparse.Namespace) -> tuple[StudyResult, Path | None]:

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from stickslip.errors import InputError
 from stickslip.record import Record
+
+if TYPE_CHECKING:
+    import pandas
+
+ERROR = "position_rms_rad"
+"""The metric that a printed result shows."""
+SHOWN = 12
+"""Runs that it shows, at most."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +65,7 @@ class Run:
         return Record.load(self.path)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StudyResult:
     """A finished study.
 
@@ -92,3 +103,44 @@ class StudyResult:
             if run.key == key:
                 return run
         raise KeyError(key)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row a run: its names, every metric, why it failed; its comparisons' runs after the others.
+
+        Raises
+        ------
+        InputError
+            Without pandas, which `pip install 'stickslip[pandas]'` brings.
+        """
+        try:
+            import pandas
+        except ModuleNotFoundError:
+            raise InputError("to_pandas() needs pandas; run `pip install 'stickslip[pandas]'`") from None
+        names = ("slip_rule", "reference", "friction", "controller")
+        return pandas.DataFrame(
+            [
+                {**{name: getattr(run, name) for name in names}, **run.metrics, "failure": run.failure}
+                for run in (*self.runs, *self.extras)
+            ]
+        )
+
+    def _rows(self) -> list[tuple[str, str]]:
+        """Name of each run, and its error or why it has none."""
+        every = [*self.runs, *self.extras]
+        return [(r.key, r.failure or f"{r.metrics.get(ERROR, math.nan):.4g}") for r in every[:SHOWN]]
+
+    def __repr__(self) -> str:
+        rows, count = self._rows(), len(self.runs) + len(self.extras)
+        width = max((len(key) for key, _ in rows), default=0)
+        lines = [f"{'run':<{width}}  {ERROR}", *(f"{key:<{width}}  {said}" for key, said in rows)]
+        more = [f"and {count - SHOWN} more runs: to_pandas()"] if count > SHOWN else []
+        return (
+            "\n".join([f"<StudyResult: {count} runs in {self.folder}", *(f"  {x}" for x in lines + more)])
+            + ">"
+        )
+
+    def _repr_html_(self) -> str:
+        """A table in a notebook: the error of every run."""
+        body = "".join(f"<tr><td>{escape(k)}</td><td>{escape(x)}</td></tr>" for k, x in self._rows())
+        head = f"<tr><th>run</th><th>{ERROR}</th></tr>"
+        return f"<table><thead>{head}</thead><tbody>{body}</tbody></table>"

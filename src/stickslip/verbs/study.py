@@ -1,0 +1,111 @@
+"""Controllers compared over machines, references and friction models: the verb `study`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from stickslip.arguments import arguments_checked
+from stickslip.errors import InputError
+from stickslip.study import study as studies
+from stickslip.study.bench import is_bench
+from stickslip.study.plan import Study, load, select
+from stickslip.study.result import StudyResult
+
+
+@arguments_checked
+def study(
+    file: str | os.PathLike[str] | Study,
+    folder: str | os.PathLike[str] | None = None,
+    *,
+    only: Sequence[str] = (),
+    jobs: int = 1,
+    seeds: int | None = None,
+    ablation: bool = True,
+    report: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> StudyResult:
+    """Run every controller of a study on every machine, reference and friction model, and judge them by their metrics.
+
+    Finished runs are kept in the folder: the same call goes on where another was interrupted.
+
+    Parameters
+    ----------
+    file : path or Study
+        A TOML file, "thesis", "imperfections" or "thesis-rig", or what `stickslip.study.plan.load` gave.
+    folder : path, optional
+        Where to write records, tables, manifest.json and report.html; study-NAME here unless given.
+    only : sequence of str
+        Parts of the names of the runs that are wanted, such as ("low", "FF-lugre"); all unless given.
+    jobs : int
+        Runs at a time.
+    seeds : int, optional
+        Of a study of experiments: further angles of the start that every run begins at.
+    ablation : bool
+        Of a study of experiments: whether runs with one imperfection less are run too.
+    report : bool
+        Whether figures and report.html are written.
+    progress : callable, optional
+        ``progress(finished, all)``
+
+    Returns
+    -------
+    StudyResult
+        Of the runs that were asked for: names, metrics, files, and `StudyResult.to_pandas`.
+
+    Raises
+    ------
+    InputError
+        One line that names the key, its value and what is allowed.
+    """
+    planned = study_of(file, seeds, ablation)
+    if not all(part.strip() for part in only):
+        raise InputError(f"only = {list(only)!r} has an empty part; give names like 'low', 'step'")
+    wanted = [part.strip() for part in only]
+    out = Path(folder) if folder is not None else Path(f"study-{planned.name}")
+    result = studies.run(planned, out, wanted or None, jobs, progress)
+    if report:
+        from stickslip.report import write
+
+        write(result)
+    return chosen(result, planned, wanted)
+
+
+def study_of(file: str | os.PathLike[str] | Study, seeds: int | None = None, ablation: bool = True) -> Study:
+    """The study of a file, its experiments with other seeds or without ablation.
+
+    Raises
+    ------
+    InputError
+        If the file is not a study's, or a number cannot be.
+    """
+    if seeds is not None and seeds < 0:
+        raise InputError(f"--seeds {seeds} must be 0 or more")
+    given: dict[str, Any] = {} if seeds is None else {"seeds": seeds}
+    if not ablation:
+        given["ablation"] = False
+    if isinstance(file, Study):
+        if given:
+            raise InputError(
+                f"{' and '.join(sorted(given))} cannot be given beside a study that is loaded; give the file's path"
+            )
+        return file
+    if is_bench(os.fspath(file)):
+        raise InputError(
+            f"{os.fspath(file)} is a bench of compensators, not a study; run `stickslip study {os.fspath(file)}` "
+            "(Python: stickslip.study.bench.run_bench)"
+        )
+    return load(os.fspath(file), given=given)
+
+
+def chosen(result: StudyResult, planned: Study, only: Sequence[str]) -> StudyResult:
+    """The runs that were asked for: the folder may hold more of the study."""
+    keys = {p.key for p in select([*planned.runs, *planned.extras], only)}
+    return replace(
+        result,
+        runs=[r for r in result.runs if r.key in keys],
+        extras=[r for r in result.extras if r.key in keys],
+    )
