@@ -46,6 +46,9 @@ KNOWN = 0.5
 AS_GOOD = 1.5
 """Times as much as the regression leaves of the torque in certain sliding, that other values may leave and still
 stand."""
+CONTRADICTS = 0.2
+"""Part of the larger of two methods' numbers, by which they may differ where one is identified: the other is what four
+lines of least squares give."""
 DOUBT = "the prediction error, the only evidence for it, contradicts certain sliding on {name}: {other} against {own}"
 
 ONE_BAND = (
@@ -379,6 +382,10 @@ def held_together(
     wide = told(e, p, e.value, min(e.lower, value), max(e.upper, value), scale)
     if not wide.lower <= value <= wide.upper:
         return wide, []  # it cannot be
+    if wide.identified and abs(value - e.value) > CONTRADICTS * max(abs(value), abs(e.value)):
+        wide = replace(
+            wide, identified=False, verdict=f"the plain inverse dynamics says {value:.4g} {e.unit} instead"
+        )
     return wide, [
         f"{e.name}: the plain inverse dynamics, reversals included, says {value:.4g}, certain sliding {e.value:.4g} "
         f"{e.unit}; the interval holds both."
