@@ -36,8 +36,18 @@ def profile(t: float, p: Any, out: Any) -> None:
 
 
 def breaks(p: Any, duration: float) -> Sequence[float]:
-    """None: smooth after t = 0."""
-    return []
+    """Where the velocity becomes too small for a number, 745 tau about: a feedforward of its sign ends there."""
+    low, high = 600.0 * p.tau, 800.0 * p.tau
+    if not 0.0 < low < duration or p.amplitude == 0.0:
+        return []
+    for _ in range(60):
+        t = 0.5 * (low + high)
+        x = t / p.tau
+        if p.amplitude * x * math.exp(-x) / p.tau != 0.0:
+            low = t
+        else:
+            high = t
+    return [high] if high < duration else []
 
 
 REFERENCE = ReferenceKind(

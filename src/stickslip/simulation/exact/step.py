@@ -43,12 +43,17 @@ CALM_SHARE = 0.2
 BRISTLE_SHARE = 4.0
 """Errors of a bristle in feedback grow: it is a negative spring near rest."""
 SHORT = 2e-8  # s
-STEEPEST = 1e5
+STEEPEST = 3e5
 """Largest particular solution, rad: more would cost too many digits."""
+LAST_DIGIT, LOST, LEAST_LOST = 2.2e-16, 67.0, 1e-11
+"""What rounding may take of a particular solution: parts of a step's tolerance (a tenth of the run's), and rad. Under a
+command that changes within microseconds no step is exact; another integrator runs it."""
 MOST_ROUNDS = 5
 MOST_UNSEEN = 4
-BUMP = 8.0 / 15.0
-"""Mean of x²(1 - x)² over its value in the middle."""
+BUMP, PARABOLA = 8.0 / 15.0, 2.0 / 3.0
+"""Means of x²(1 - x)² and of x(1 - x) over their values in the middle."""
+ONE_SIDED, PASSING = 0.2, 1e-3
+"""Of a torque taken for a straight line: parts of its third power of time, and of its bend, that count as a misfit."""
 LASTING = 5e-3
 """How long an error of a slipping force lasts, s: no more than C/s lets it."""
 
@@ -201,11 +206,12 @@ def loop_terms(
 
 
 @kernel(exact=False, inline=True)
-def commanded(lin: Linear, loop: Loop, h: float) -> tuple[float, float, float, float, float]:
-    """The commanded torque over the segment: three coefficients, its misfit in the middle, 1 or 0 if straight.
+def commanded(lin: Linear, loop: Loop, h: float) -> tuple[float, float, float, float, float, float]:
+    """The commanded torque over the segment: three coefficients, its misfit in the middle and the mean of that, 1 or 0
+    if straight.
 
     Over very short segments the upper terms are rounding errors, or a kink that the particular solution blows
-    up: there the forcing is a straight line.
+    up: there the forcing is a straight line, of which the torque is off by a parabola.
     """
     now, segment = loop.now, loop.segment
     inverse = 1.0 / h
@@ -216,10 +222,23 @@ def commanded(lin: Linear, loop: Loop, h: float) -> tuple[float, float, float, f
         - 0.5 * (now.command + segment.command_end)
         - 0.125 * h * (r1 - segment.command_rate_end)
     )
-    lag = lin.damping * lin.compliance
-    if h < SHORT or abs(r3 * lag * lag * lag) > STEEPEST * abs(lin.stiffness):
-        return (segment.command_end - now.command) * inverse, 0.0, 0.0, misfit, 0.0
-    return r1, r2, r3, misfit, 1.0
+    lag = abs(lin.damping * lin.compliance)
+    size = 6.0 * abs(r3 * lin.compliance) * lag * (lag * lag + 2.0 * abs(lin.inertia * lin.compliance))
+    if h < SHORT or size > STEEPEST:
+        off = segment.command_mid - 0.5 * (now.command + segment.command_end)
+        # Lifted, the parabola has no impulse left: damping brings little of it back, the motion inside sees it pass.
+        bent = ONE_SIDED * abs(r3) * h * h * h + abs(off) * (
+            PASSING + min(h * lin.damping / lin.inertia, 1.0)
+        )
+        return (
+            (segment.command_end - now.command) * inverse,
+            0.0,
+            0.0,
+            abs(misfit) + bent,
+            PARABOLA * off,
+            0.0,
+        )
+    return r1, r2, r3, misfit, BUMP * misfit, 1.0
 
 
 @kernel(exact=False, inline=True)
@@ -263,10 +282,10 @@ def correct(lin: Linear, loop: Loop, half: Matrix, h: float, tol: float) -> floa
     """Move the axis over h; fills `segment` and returns the error in position, rad (or NOT_CONVERGED)."""
     now = loop.now
     full = twice(half)
-    r1, r2, r3, command_misfit, bent = commanded(lin, loop, h)
+    r1, r2, r3, command_misfit, lift, bent = commanded(lin, loop, h)
     p0, p1 = tangents(loop)
     # The cubic is lifted by the mean of the bump that it leaves out, so that the impulse is right.
-    p0 += now.command + bent * BUMP * command_misfit
+    p0 += now.command + lift
     p1 += r1
     p2 = r2
     p3 = r3
@@ -310,6 +329,8 @@ def correct(lin: Linear, loop: Loop, half: Matrix, h: float, tol: float) -> floa
             p3 += bent * u3
             misfit += abs(m)
         rounds += 1
+    if LAST_DIGIT * abs(c[0]) > max(LOST * tol, LEAST_LOST):
+        return NOT_CONVERGED
     remember(
         loop.segment, c, h, (free_position, free_velocity), (theta_mid, v_mid), (theta_end, v_end), rounds
     )

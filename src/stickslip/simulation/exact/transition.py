@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from stickslip.jit import kernel
-from stickslip.simulation.case_arrays import KI, KP, PERTURBATION, POSITION_0, VELOCITY_0
+from stickslip.simulation.case_arrays import KI, KP, PERTURBATION, POSITION_0, TOLERANCE, VELOCITY_0
 from stickslip.simulation.exact.events import BARELY, NONE, load_of
 from stickslip.simulation.exact.forces import command, sliding
 from stickslip.simulation.exact.output import row_before
@@ -25,7 +25,11 @@ ROUNDING = 1e-10
 """N·m by which a load may seem to miss the limit that it was located at."""
 ON_EDGE = 1e-6
 """Velocities this near the edge of a steep layer, in parts of it, are on it."""
-LONGEST_REST = 2e-3
+LONGEST_REST, SHORTEST_REST = 2e-3, 1e-9
+"""s, at rest between two looks at the torque."""
+SEEN = 0.05
+"""Part of what is held, by which the torque may lie off its cubic there."""
+HOLDS, BREAKS = 0, 1
 LASTING, LEAST = 1e-4, 1e-3
 """A step that is shorter than this (s) is perturbed by as much less, but by no less than this share."""
 
@@ -223,8 +227,31 @@ def enter_or_leave(loop: Loop, side: Any, v: float) -> None:
 @kernel(exact=False)
 def rest(loop: Loop, left: float) -> float:
     """Stay at rest for at most `left` s; fills `segment`, returns when the axis breaks away or NONE."""
+    limit = max(stiction(loop), 0.0)
+    if abs(applied(loop)) > limit:
+        stay(loop, min(left, LONGEST_REST))
+        return 0.0
+    seen, h = overseen(loop, min(left, LONGEST_REST), limit)
+    if seen == HOLDS:
+        stay(loop, h)
+        return NONE
+    low = 0.0
+    for _ in range(60):
+        x = 0.5 * (low + h)
+        if abs(torque_after(loop, x)[0]) > limit:
+            h = x
+        else:
+            low = x
+        if h - low < 1e-13:
+            break
+    stay(loop, h)
+    return h
+
+
+@kernel(exact=False)
+def stay(loop: Loop, h: float) -> None:
+    """Fill `segment` with h at rest."""
     now, segment = loop.now, loop.segment
-    h = min(left, LONGEST_REST)
     theta = now.position
     look_ahead(loop, h, 0.0)
     remember(segment, (theta, 0.0, 0.0, 0.0), h, (0.0, 0.0), (theta, 0.0), (theta, 0.0), 0)
@@ -233,37 +260,62 @@ def rest(loop: Loop, left: float) -> float:
     segment.integral_end = now.integral + reference_integral - theta * h
     segment.position_event = theta
     segment.velocity_event = 0.0
-    low = 0.0
-    if excess(loop, 0.0) > 0.0:
-        return 0.0
-    for node in range(1, 3):
-        high = 0.5 * node * h
-        if excess(loop, high) > 0.0:
-            for _ in range(60):
-                x = 0.5 * (low + high)
-                if excess(loop, x) > 0.0:
-                    high = x
-                else:
-                    low = x
-                if high - low < 1e-13:
-                    break
-            return high
-        low = high
-    return NONE
 
 
 @kernel(exact=False)
-def excess(loop: Loop, x: float) -> float:
-    """Applied torque beyond what is held, after another x at rest, N·m."""
+def overseen(loop: Loop, longest: float, limit: float) -> tuple[int, float]:
+    """How long the torque at rest is overseen, s, and whether it `HOLDS` that long or `BREAKS` away.
+
+    It is where it lies on its cubic, and its control polygon (Bernstein) holds or only rises: no peak hides between.
+    """
+    now = loop.now
+    start = applied(loop)
+    slope = now.command_rate + loop.parameters[KI] * (now.goal - now.position)
+    h = longest
+    while True:
+        middle = torque_after(loop, 0.5 * h)[0]
+        end, end_slope = torque_after(loop, h)
+        first, last = start + h / 3.0 * slope, end - h / 3.0 * end_slope
+        off = abs(middle - 0.5 * (start + end) - 0.125 * h * (slope - end_slope))
+        soon = h < SHORTEST_REST
+        if soon or (off <= SEEN * limit and integrates(loop, h)):
+            if max(abs(first), abs(last), abs(middle), abs(end)) + off <= limit:
+                return HOLDS, h
+            sign = 1.0 if end > 0.0 else -1.0
+            rises = sign * start <= sign * first <= sign * last <= sign * end
+            if abs(end) > limit and (rises or soon):
+                return BREAKS, h
+            if soon:
+                return (BREAKS, 0.5 * h) if abs(middle) > limit else (HOLDS, h)
+        h *= 0.5
+
+
+@kernel(exact=False)
+def integrates(loop: Loop, h: float) -> bool:
+    """Whether the integral of the reference over h is good to the tolerance."""
     parameters, now = loop.parameters, loop.now
-    middle = command(loop, now.time + 0.5 * x)
+    if parameters[KI] == 0.0:
+        return True
+    middle = command(loop, now.time + 0.5 * h).position
+    end = command(loop, now.time + h)
+    off = middle - 0.5 * (now.goal + end.position) - 0.125 * h * (now.goal_rate - end.velocity)
+    return parameters[KI] * h * abs(off) <= parameters[TOLERANCE] * max(parameters[KP], parameters[KI] * h)
+
+
+@kernel(exact=False)
+def torque_after(loop: Loop, x: float) -> tuple[float, float]:
+    """Applied torque after another x at rest, N·m, and its rate."""
+    parameters, now = loop.parameters, loop.now
     end = command(loop, now.time + x)
     torque = applied(loop) + end.torque - now.command
+    rate = end.torque_rate
     if parameters[KI] != 0.0:
+        middle = command(loop, now.time + 0.5 * x)
         reference_integral = x / 30.0 * (7.0 * (now.goal + end.position) + 16.0 * middle.position)
         reference_integral += x * x / 60.0 * (now.goal_rate - end.velocity)
         torque += parameters[KI] * (reference_integral - now.position * x)
-    return abs(torque) - max(stiction(loop), 0.0)
+        rate += parameters[KI] * (end.position - now.position)
+    return torque, rate
 
 
 @kernel(exact=False)
