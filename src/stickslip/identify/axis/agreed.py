@@ -58,6 +58,7 @@ ONE_BAND = (
 BAND_ALONE = (
     "one band of frequencies alone tells it, where level and slope, or motor and load, are not told apart"
 )
+OTHER_FORM = "slower steady motion has another friction than this level and slope"
 LEVELS = ("fc", "sigma2", *FALL)
 """What sliding alone tells of friction; that of v < 0 too where it has parameters of its own."""
 UNSEEN = (
@@ -137,6 +138,11 @@ def on_creep(found: Regression | None, axis: ServoAxis) -> list[str]:
     if found is None or found.creep.speed == 0.0:
         return []
     speed, missing = f"{found.creep.speed:.3g} {axis.unit('rad/s')}", f"{found.creep.missing:.0%}"
+    if found.creep.steady:
+        return [
+            f"Slower than {speed} {missing} of friction's level is missing although the axis slides steadily: friction "
+            f"rises with velocity in another form than a level and a slope, which are those of faster motion alone."
+        ]
     return [
         f"Slower than {speed} {missing} of friction's level is missing (a motor that goes on alone within the play, or "
         f"friction that builds up with velocity): inertia and friction are those of faster motion."
@@ -287,6 +293,8 @@ def told_apart(estimates: Iterable[Estimate], found: Regression, model: Model) -
 
     def doubt_on(e: Estimate) -> str:
         name = e.name.removesuffix(NEGATIVE)
+        if found.creep.steady and name in ("fc", "sigma2"):
+            return OTHER_FORM
         alone = clear.get(name) and not found.confirmed(name)
         if alone and (name != "sigma2" or found.rough or high > ALONE * low):
             return BAND_ALONE

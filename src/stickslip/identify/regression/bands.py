@@ -18,7 +18,7 @@ from stickslip.identify.fit.shifts import Whole, least_between, shifts_looked_at
 from stickslip.identify.fit.smooth import Window, seen
 from stickslip.identify.regression.band_fit import BandFit, fit_band
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
-from stickslip.identify.regression.creeping import NOWHERE, Creep, creep_of
+from stickslip.identify.regression.creeping import FAR, NOWHERE, Creep, creep_of, steady_lack
 from stickslip.identify.regression.drifting import DRIFTS
 from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.orders import candidate_orders, goes_round, shown_orders
@@ -206,7 +206,8 @@ def in_bands(
             if not bands:
                 known = options["skew"]
                 start = clear_skew(signals, factor * width) if known is None else known
-                widest, falls, creep = rows_of(signals, factor * width, start, exponents)
+                far = math.inf if axis.gravity == "pendulum" else FAR[axis.motion]
+                widest, falls, creep = rows_of(signals, factor * width, start, exponents, far)
                 own = {**options, "start": start}
                 chosen = {
                     "start": start,
@@ -298,10 +299,10 @@ def misfits(rows: Sequence[SlidingRows], shifts: Whole) -> Array:
 
 
 def rows_of(
-    signals: Sequence[Signals], width: float, skew: float, exponents: Sequence[float]
+    signals: Sequence[Signals], width: float, skew: float, exponents: Sequence[float], far: float = math.inf
 ) -> tuple[list[SlidingRows], list[Fall], Creep]:
     """Rows seen through one window, without those where friction is still being rebuilt or the axis creeps with too
-    little of it; the falls tried; and that creeping."""
+    little of it; the falls tried; and that creeping, or what friction lacks `far` behind a reversal, rad (m)."""
     windows = [Window(width, s.period) for s in signals]
     first = [sliding_rows(s, w) for s, w in zip(signals, windows, strict=True)]
     speed = np.abs(stacked(first, "speed"))
@@ -315,7 +316,10 @@ def rows_of(
         raise InputError("friction is rebuilt over the whole of every stroke; record longer strokes")
     creep = creep_of(rows, skew)
     faster = [r for r in (r.faster(creep.speed) for r in rows) if r.time.size >= FEWEST]
-    return (faster, falls, creep) if faster and creep is not NOWHERE else (rows, falls, NOWHERE)
+    if not faster or creep is NOWHERE:
+        faster, creep = rows, NOWHERE
+    steady = steady_lack(first, faster, skew, far)
+    return faster, falls, creep if steady is NOWHERE else steady
 
 
 # ---- what the bands say together ------------------------------------------------------------

@@ -29,11 +29,20 @@ MISSING = 0.15
 play and in 9 of 1,683 others (1070000, 1120000, and 1080000 with exponent 1)."""
 
 
+FAR = {"rotary": 0.35, "linear": 0.035}
+"""rad, m: way behind a reversal from which on neither play nor pre-sliding (20 degrees at most) lets friction lack."""
+
+
 class Creep(NamedTuple):
-    """Speed up to which friction is missing, rad/s (m/s), and the part of its level that is; 0 where none is."""
+    """Speed up to which friction is missing, rad/s (m/s), and the part of its level that is; 0 where none is.
+
+    `steady` where it is missing over ways that no play has: friction rises with the speed in another form than the
+    law's.
+    """
 
     speed: float = 0.0
     missing: float = 0.0
+    steady: bool = False
 
 
 NOWHERE = Creep()
@@ -65,3 +74,28 @@ def creep_of(records: Sequence[SlidingRows], skew: float) -> Creep:
         if np.any(inside) and float(np.median(missing[inside])) > MISSING:
             limit, lacking = high * top, lacking | inside
     return Creep(limit, float(np.median(missing[lacking]))) if np.mean(lacking) >= SHARE else NOWHERE
+
+
+def steady_lack(first: Sequence[SlidingRows], kept: Sequence[SlidingRows], skew: float, far: float) -> Creep:
+    """What friction lacks, beside the level and slope of the `kept` rows, in slower ones that were left out although
+    the axis had gone `far` since it turned, rad (m): at the speeds where most of it does."""
+    fixed, speed, gone = (stacked(first, name) for name in ("fixed", "speed", "gone"))
+    slowest = float(np.min(np.abs(stacked(kept, "speed"))))
+    slower = (gone > far) & (np.abs(speed) < slowest)
+    fewest = max(FEWEST, SHARE * speed.size)
+    if np.count_nonzero(slower) < fewest:
+        return NOWHERE
+    values = least_squares(stacked(kept, "fixed"), np.concatenate([r.torque(skew) for r in kept]))
+    level = float(values[DIRECTION])
+    if level <= 0.0:
+        return NOWHERE
+    torque = np.concatenate([r.torque(skew) for r in first])
+    missing = -(torque - fixed @ values) * fixed[:, DIRECTION] / level
+    octave = np.floor(np.log2(slowest / np.maximum(np.abs(speed), 1e-9 * slowest)))
+    lacks = [
+        float(np.median(missing[inside]))
+        for k in np.unique(octave[slower])
+        if np.count_nonzero(inside := slower & (octave == k)) >= fewest
+    ]
+    most = max(lacks, default=0.0)
+    return Creep(slowest, most, steady=True) if most > MISSING else NOWHERE
