@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -73,9 +74,93 @@ def test_the_numbers_of_a_saved_profile_are_shown_before_the_result_and_asked_ab
     assert "which says torque_constant = 0.05; delete that file to forget it" in streams.err
     assert "hold for this machine" not in streams.err
     assert main(["identify", "large.csv", *calls]) == 0
-    assert (
-        "a record of 0.1 N·m of torque, this one has 0.9: does torque_constant = 0.05 hold"
-        in capsys.readouterr().err
-    )
+    streams = capsys.readouterr()
+    asked = "a record of 0.1 N·m of torque, this one has 0.9: does torque_constant = 0.05 hold"
+    assert asked in streams.err
     assert main(["identify", "large.csv", *calls, "--torque-constant", "0.2"]) == 0
     assert "hold for this machine" not in capsys.readouterr().err
+    assert main(["identify", "small.csv", *calls]) == 0  # each file has what was said for it
+    streams = capsys.readouterr()
+    assert "which says torque_constant = 0.05; delete that file to forget it" in streams.err
+    assert "not said for this file" not in streams.err + streams.out
+
+
+@pytest.fixture
+def two_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files a.csv and b.csv of axes with the same columns: a position in mm, a torque in % of the rated one."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("STICKSLIP_CONFIG", str(tmp_path / "config"))
+    t = np.arange(3000) * 1e-3
+    way = 40.0 * np.sin(2.0 * np.pi * t)
+    share = 20.0 * np.sign(np.cos(2.0 * np.pi * t))
+    for name, size in (("a.csv", 1.0), ("b.csv", 1.1)):
+        table = np.column_stack((t, size * way, share))
+        np.savetxt(name, table, "%.9g", ",", header="time [s],ActPos [mm],ActTrq [%]", comments="")
+
+
+@pytest.mark.usefixtures("two_axes")
+def test_numbers_of_another_axis_are_a_warning_and_part_of_the_verdict(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A second file with the same columns took rated torque and lead of the first and was said to be identified."""
+    calls = ["--inverse", "--no-report", "--force", "--out", "model.toml"]
+    assert main(["identify", "a.csv", *calls, "--rated-torque", "2.39", "--lead", "10"]) == 0
+    assert "2.39" not in capsys.readouterr().out
+    assert main(["identify", "b.csv", *calls]) == 0
+    streams = capsys.readouterr()
+    told = f"rated_torque = 2.39 N·m, lead = 10 mm: not said for this file, but for a.csv on {datetime.now(UTC):%Y-}"
+    trust = next(line for line in streams.out.splitlines() if line.startswith("trust: "))
+    assert trust.startswith("trust: With care:")
+    assert told in trust
+    assert told in streams.err
+    assert (
+        "give this axis's own with --rated-torque NM --lead MM, or --rated-torque 2.39 --lead 10"
+        in streams.err
+    )
+    assert main(["doctor", "b.csv"]) == 0
+    assert "warning saved-numbers" in capsys.readouterr().out
+    assert main(["doctor", "b.csv", "--rated-torque", "5", "--lead", "20"]) == 0
+    assert "saved-numbers" not in capsys.readouterr().out
+    assert main(["doctor", "b.csv"]) == 0  # it was said for this very file
+    out = capsys.readouterr().out
+    assert "saved-numbers" not in out
+    assert "rated torque 5" in out
+
+
+@pytest.mark.usefixtures("two_axes")
+def test_a_gear_ratio_that_the_columns_do_not_need_is_never_taken_over(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    for name in ("c.csv", "d.csv"):
+        text = (
+            (tmp_path / "a.csv").read_text().replace("ActPos [mm],ActTrq [%]", "Position [rad],Torque [Nm]")
+        )
+        (tmp_path / name).write_text(text + ("2.999,0,0\n" if name == "d.csv" else ""))
+    main(["doctor", "c.csv", "--gear-ratio", "20", "--side", "load"])
+    assert "gear ratio 20" in capsys.readouterr().out
+    main(["doctor", "d.csv"])
+    out = capsys.readouterr().out
+    assert "gear ratio 20" not in out
+    assert "gear_ratio = 20, side = load (for c.csv on " in out
+    assert "is kept and not used" in out
+    main(["doctor", "d.csv", "--map", "position=Position [rad]:rad@load"])  # without it this cannot be read
+    out = capsys.readouterr().out
+    assert "warning saved-numbers" in out
+    assert "gear_ratio = 20" in out
+
+
+@pytest.mark.usefixtures("two_axes")
+def test_counts_that_a_number_of_the_drive_told_are_what_the_column_means(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    t = np.arange(3000) * 1e-3
+    counts = np.round(9000.0 * np.sin(2.0 * np.pi * t))
+    for name, sign in (("e.csv", 1.0), ("f.csv", -1.0)):
+        table = np.column_stack((t, sign * counts, np.sign(np.cos(2.0 * np.pi * t))))
+        np.savetxt(name, table, "%.9g", ",", header="time [s],pos,torque [Nm]", comments="")
+    main(["doctor", "e.csv", "--counts-per-rev", "4096"])
+    capsys.readouterr()
+    main(["doctor", "f.csv"])
+    out = capsys.readouterr().out
+    assert "counts_per_rev = 4096: not said for this file, but for e.csv on" in out
+    assert "position=pos:counts" in out

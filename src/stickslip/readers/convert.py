@@ -117,7 +117,7 @@ def convert(
     """
     said = list(findings)
     by_role = {choice.role: choice for choice in choices}
-    linear = _is_linear(by_role)
+    linear = is_linear(by_role)
     columns = {c.name: c for c in table.columns}
     time, origin, more = time_of(table, by_role, columns, sample_time)
     said += more
@@ -137,7 +137,7 @@ def convert(
                 }
             )
             continue
-        unit = _unit(choice, linear)
+        unit = unit_of(choice, linear)
         scale, target, steps = _scale(choice, unit, drive, linear)
         values, resampled = on_clock(columns[choice.column], time, origin, role)
         said += resampled
@@ -169,14 +169,15 @@ def convert(
 # ---- units --------------------------------------------------------------------------------------------------
 
 
-def _is_linear(by_role: dict[str, Choice]) -> bool:
+def is_linear(by_role: dict[str, Choice]) -> bool:
     """Whether the axis moves along a line: a length, a linear velocity or a force is stated."""
     stated = [parse_unit(c.unit) for c in by_role.values() if c.unit and c.role in (*MOTION, *EFFORT)]
     kinds = [u.kind for u in stated if u is not None]
     return any(k in ("length", "velocity", "acceleration", "force") for k in kinds) and "angle" not in kinds
 
 
-def _unit(choice: Choice, linear: bool) -> Unit:
+def unit_of(choice: Choice, linear: bool) -> Unit:
+    """The unit that a column is read in: the stated one, or SI where nobody states one."""
     if (unit := parse_unit(choice.unit)) is not None:
         return unit
     kind = KINDS[choice.role][0]

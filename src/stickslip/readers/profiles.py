@@ -17,23 +17,48 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.config import Table as Section
 from stickslip.config import read_toml
 from stickslip.errors import InputError
-from stickslip.finding import Finding
 from stickslip.readers._choose import parse_mapping
 from stickslip.readers.convert import TURNING, Drive
 from stickslip.readers.table_columns import Table
 from stickslip.record import Record
 
-NUMBERS_BEHIND = {
-    "speed": ("counts_per_rev", "gear_ratio", "lead"),
-    "torque": ("torque_constant", "force_constant", "rated_torque", "rated_current", "gear_ratio", "lead"),
-}
-"""Numbers of the drive on which the size of a signal depends."""
 PUTS_OUT = {"force_constant": TURNING, **dict.fromkeys(TURNING, ("force_constant",))}
 """What is said now of a linear motor takes the place of what a profile says of one that turns, and the other way."""
-OTHER = 4.0
-"""Times as large, or as small, from which on it is asked whether they hold."""
+SIZES = ("speed", "torque")
+"""What `sizes` tells of a record."""
+STATEMENTS = 20
+"""Files whose numbers a profile keeps, the last ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """Numbers that were said for one file: they are its machine's, and other machines' files have the same columns.
+
+    Attributes
+    ----------
+    drive : Drive
+    sample_time : float or None
+        s
+    file, sha256, date : str
+        Path and digest of the file, and the day (ISO 8601) of the last word; empty where nobody knows them.
+    seen : mapping of str to float
+        Size of speed and torque in it, as `sizes` gives it.
+    """
+
+    drive: Drive
+    sample_time: float | None = None
+    file: str = ""
+    sha256: str = ""
+    date: str = ""
+    seen: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def numbers(self) -> dict[str, Any]:
+        """What it says, by name."""
+        out = {n: x for n, x in self.drive.known().items() if (n, x) != ("side", "motor")}
+        return out if self.sample_time is None else {**out, "sample_time": self.sample_time}
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,21 +70,25 @@ class Profile:
     mapping : mapping of str to str
         Channel to "COLUMN", "COLUMN:UNIT" or "COLUMN:UNIT@side".
     drive : Drive
+        Of a profile that the user names: it is one machine's.
     sample_time : float or None
         s, for files without times.
-    seen : mapping of str to float
-        Size of speed and torque in the record that it was written for, as `sizes` gives it.
+    said : tuple of Statement
+        Of a profile that is found by the columns: what was said for which file, the last word at the end.
     """
 
     mapping: Mapping[str, str]
     drive: Drive
     sample_time: float | None = None
-    seen: Mapping[str, float] = field(default_factory=dict[str, float])
+    said: tuple[Statement, ...] = ()
 
 
 def alike(first: Profile, second: Profile) -> bool:
     """Whether both say the same; a number that nobody gave (not a number) is equal to another."""
-    said = [(dict(p.mapping), p.drive.known(), p.sample_time) for p in (first, second)]
+    said = [
+        (dict(p.mapping), p.drive.known(), p.sample_time, [(s.sha256, s.numbers()) for s in p.said])
+        for p in (first, second)
+    ]
     return said[0] == said[1]
 
 
@@ -74,26 +103,6 @@ def sizes(record: Record) -> dict[str, float]:
     if "motor_torque" in record.channels and np.any(np.isfinite(record["motor_torque"])):
         out["torque"] = float(np.nanpercentile(np.abs(record["motor_torque"]), 95))
     return {key: value for key, value in out.items() if math.isfinite(value) and value > 0.0}
-
-
-def misfits(profile: Profile, record: Record, overruled: Mapping[str, Any]) -> list[Finding]:
-    """What asks whether a profile's numbers hold for this record: of another size than the one it was written for."""
-    out: list[Finding] = []
-    now, known = sizes(record), profile.drive.known()
-    for key, before in profile.seen.items():
-        brought = [n for n in NUMBERS_BEHIND[key] if n in known and n not in overruled]
-        if key not in now or not brought or 1.0 / OTHER < now[key] / before < OTHER:
-            continue
-        unit = record.units["motor_torque"] if key == "torque" else f"{record.units['position']}/s"
-        said = " and ".join(f"{name} = {known[name]:g}" for name in brought)
-        message = (
-            f"the saved profile was written for a record of {before:.3g} {unit} of {key}, this one has {now[key]:.3g}: "
-            f"does {said} hold for this machine?"
-        )
-        options = " or ".join(f"--{name.replace('_', '-')}" for name in brought)
-        remedy = f"if not, give {options}; with --profile FILE.toml a machine has a profile of its own"
-        out.append(Finding("warning", "profile-misfit", message, remedy=remedy))
-    return out
 
 
 def fingerprint(table: Table) -> str:
@@ -131,17 +140,33 @@ def load(path: Path) -> Profile:
         if top.has("columns"):
             with top.table("columns") as columns, columns.blamed():
                 mapping = parse_mapping({key: columns.text(key) for key in columns.values})
-        values: dict[str, Any] = {}
+        drive = Drive()
         if top.has("drive"):
             with top.table("drive") as table, table.blamed():
-                numbers = [f.name for f in fields(Drive) if f.name != "side" and table.has(f.name)]
-                values = {name: table.positive(name, "") for name in numbers}
-                values["side"] = table.choice("side", ("motor", "load"), "motor")
-        seen: dict[str, float] = {}
-        if top.has("seen"):
-            with top.table("seen") as table, table.blamed():
-                seen = {key: table.positive(key, "") for key in NUMBERS_BEHIND if table.has(key)}
-        return Profile(mapping, Drive(**values), sample_time, seen)
+                drive = _drive_in(table)
+        said = [_statement(own) for own in top.tables("said").values()]
+        if top.has("seen"):  # once there was one statement, of no file that is known
+            said.insert(0, Statement(drive, sample_time, seen=_seen_in(top)))
+        return Profile(mapping, drive, sample_time, tuple(said))
+
+
+def _seen_in(top: Section) -> dict[str, float]:
+    with top.table("seen") as table, table.blamed():
+        return {key: table.positive(key, "") for key in SIZES if table.has(key)}
+
+
+def _drive_in(table: Section) -> Drive:
+    numbers = [f.name for f in fields(Drive) if f.name != "side" and table.has(f.name)]
+    values: dict[str, Any] = {name: table.positive(name, "") for name in numbers}
+    return Drive(**values, side=table.choice("side", ("motor", "load"), "motor"))
+
+
+def _statement(own: Section) -> Statement:
+    with own, own.blamed():
+        period = own.positive("sample_time", "s", math.nan) if own.has("sample_time") else None
+        words = {key: own.text(key, "") for key in ("file", "sha256", "date")}
+        seen = _seen_in(own) if own.has("seen") else {}
+        return Statement(_drive_in(own), period, **words, seen=seen)
 
 
 def merged(mapping: Sequence[str], drive: Drive, sample_time: float | None, kept: Profile | None) -> Profile:
@@ -171,13 +196,23 @@ def save(profile: Profile, table: Table, path: Path | None = None) -> Path:
     if profile.sample_time is not None:
         lines.append(f"sample_time = {profile.sample_time!r}")
     lines += ["", "[columns]", *(f"{role} = {_quoted(text)}" for role, text in profile.mapping.items())]
-    lines += [
-        "",
-        "# Sizes that 95 % of that record's rows keep, in SI units: others are asked about.",
-        "[seen]",
-    ]
-    lines += [f"{key} = {value:.4g}" for key, value in profile.seen.items()]
-    lines += ["", "[drive]", *(f"{key} = {_quoted(value)}" for key, value in profile.drive.known().items())]
+    if profile.said:
+        lines += [
+            "",
+            "# Numbers said for one file. Another with these columns gets none of them without a warning.",
+        ]
+    else:
+        lines += [
+            "",
+            "[drive]",
+            *(f"{key} = {_quoted(value)}" for key, value in profile.drive.known().items()),
+        ]
+    for number, said in enumerate(profile.said, 1):
+        lines += ["", f"[said.{number}]"]
+        words = {"file": said.file, "sha256": said.sha256, "date": said.date}
+        lines += [f"{key} = {_quoted(value)}" for key, value in (words | said.numbers()).items()]
+        # Sizes that 95 % of the record's rows keep, in SI units.
+        lines += [f"seen.{key} = {value:.4g}" for key, value in said.seen.items()]
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         draft = target.with_name(target.name + ".part")

@@ -224,7 +224,9 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
             out.append(
                 f"friction {drift} over the record: warm the axis up first, or cut with --from and --to"
             )
-    if warned:
+    # Whose numbers they are is for the reader to say: each is named here.
+    out += dict.fromkeys(f.message for f in warned if f.code == "saved-numbers")
+    if warned := [f for f in warned if f.code != "saved-numbers"]:
         out.append(f"the doctor warns of the record{'s' if len(warned) > 1 else ''} ({codes(warned)})")
     return out
 

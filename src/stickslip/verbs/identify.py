@@ -270,9 +270,8 @@ def sources_of(
             if number < fitted:
                 raise
             raise InputError(f"--hold-out: {error}") from None
-        if opened.written or opened.tells_numbers:
-            for finding in opened.notes[:1]:
-                examiner.tell(f"{name}: {finding.line()}")
+        for finding in opened.told:
+            examiner.tell(f"{name}: {finding.line()}")
         every = doctor(opened.record)
         short = Path(name).name if log is not None and name != "the log" else f"log {number + 1}"
         names = [short]

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from stickslip.arguments import arguments_checked, insist_on, rules_in, written
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding
-from stickslip.readers import profiles
+from stickslip.readers import profiles, remembered
 from stickslip.readers.convert import Drive
 from stickslip.readers.cut import Cut, cut, parse_rows, unwrapped
 from stickslip.readers.in_memory import digest_of, table_in_memory, table_of_signals
@@ -26,7 +26,6 @@ from stickslip.verbs.kinds import require
 Log = str | os.PathLike[str] | Record | Any
 """A path, a `Record`, a data frame, a mapping of arrays, or a structured array."""
 
-FORGET = "delete that file to forget it"
 SHORT = {"t": "time", "normal_force": "load"}
 SIGNALS = (
     "t", "position", "reference", "velocity", "velocity_reference", "torque", "current", "voltage", "supply",
@@ -116,9 +115,9 @@ class Opened:
     columns: tuple[tuple[str, str], ...] = ()
 
     @property
-    def tells_numbers(self) -> bool:
-        """Whether a saved profile, which nobody named, brings numbers of the drive into the result."""
-        return any(f.code == "profile" and " = " in f.message for f in self.notes)
+    def told(self) -> tuple[Finding, ...]:
+        """Notes to show before a result: of a profile that was written, of numbers that one brings or leaves out."""
+        return tuple(f for f in self.notes if f.level == "note" and (self.written or " = " in f.message))
 
 
 @arguments_checked
@@ -256,31 +255,57 @@ def _of_file(path: Path, reading: Reading, accept: Callable[[Record], object]) -
         require(Path(beside), "record")
         table = joined(table, beside, mapping, period)
     profile = Path(given) if (given := reading.get("profile")) else None
+    if profile is None and reading.get("remember", False):
+        return _as_remembered(path, table, mapping, reading, accept)
     keeps = bool(reading.get("remember", False))
-    found = profiles.remembered(table) if keeps else None
-    used = profile if profile and (profile.exists() or not keeps) else found
-    used = used if profile is None or used == profile else None
+    used = profile if profile and (profile.exists() or not keeps) else None
     kept = profiles.load(used) if used else None
     drive = _drive(reading)
     record = _part(
         record_of(table, mapping, drive=drive, profile=kept, sample_time=period), reading, str(path)
     )
     written = None
-    told = mapping or drive.known() != {"side": "motor"} or period is not None or (profile and not used)
-    if keeps and told:
+    if keeps and (_tells(mapping, drive, period) or not used):
         accept(record)
         merged = profiles.merged(mapping, drive, period, kept)
         if kept is None or not profiles.alike(merged, kept):
-            written = profiles.save(replace(merged, seen=profiles.sizes(record)), table, profile)
-    notes: tuple[Finding, ...] = ()
-    if profile is None:
-        said = profiles.merged(mapping, drive, period, None)
-        notes = _profile_notes(used, kept, said, written)
-        if kept and not written:
-            notes += tuple(profiles.misfits(kept, record, said.drive.known()))
-        record.meta["reading"]["findings"] += [note.as_data() for note in notes]
-        record.meta["reading"]["profile"] = str(used) if used and notes and not written else ""
-    return Opened(with_source(record, path), used, written, notes, named_columns(table))
+            written = profiles.save(merged, table, profile)
+    return Opened(with_source(record, path), used, written, (), named_columns(table))
+
+
+def _tells(mapping: Sequence[str], drive: Drive, period: float | None) -> bool:
+    """Whether anything is said that a profile keeps."""
+    return bool(mapping) or drive.known() != {"side": "motor"} or period is not None
+
+
+def _as_remembered(
+    path: Path, table: Table, mapping: Sequence[str], reading: Reading, accept: Callable[[Record], object]
+) -> Opened:
+    """A file read by what was said of files with its columns, which is kept for the next one."""
+    found, digest = profiles.remembered(table), remembered.digest_of_file(path)
+    kept = profiles.load(found) if found else None
+    drive, period, recalled = _drive(reading), reading.get("sample_time"), None
+    if kept is not None:
+        given = [n for n in (*NUMBERS, "side", "sample_time") if reading.get(n) is not None]
+        recalled = remembered.recall(kept, table, mapping, drive, given, digest)
+    used = recalled.profile if recalled else None
+    record = _part(
+        record_of(table, mapping, drive=drive, profile=used, sample_time=period), reading, str(path)
+    )
+    written, notes = None, list[Finding]()
+    if _tells(mapping, drive, period):
+        accept(record)
+        now = remembered.kept_now(kept, record, mapping, drive, period, path, digest)
+        if kept is None or not profiles.alike(now, kept):
+            written = profiles.save(now, table)
+    if recalled and found:
+        notes = remembered.findings_of(found, recalled, mapping, record)
+    if written and not notes:
+        words = f"how to read files with these columns is kept in the profile {written}"
+        notes.append(Finding("note", "profile", words, remedy=remembered.FORGET))
+    record.meta["reading"]["findings"] += [note.as_data() for note in notes]
+    record.meta["reading"]["profile"] = str(found) if found and notes and not written else ""
+    return Opened(with_source(record, path), found, written, tuple(notes), named_columns(table))
 
 
 def columns_of(path: str | os.PathLike[str]) -> tuple[tuple[str, str], ...]:
@@ -333,28 +358,6 @@ def _cut(record: Record, reading: Reading) -> Record:
 
 def _rows(option: str, given: str | tuple[int, int]) -> tuple[float, float]:
     return parse_rows(option, given if isinstance(given, str) else f"{given[0]}:{given[1]}")
-
-
-def _profile_notes(
-    used: Path | None, kept: profiles.Profile | None, said: profiles.Profile, written: Path | None
-) -> tuple[Finding, ...]:
-    """That a profile which nobody named now says more than the options, and that one was written."""
-    notes: list[Finding] = []
-    if kept:
-        now, before = said.drive.known(), kept.drive.known()
-        held = profiles.merged([], said.drive, None, kept).drive.known()
-        more = [f"{role}={text}" for role, text in kept.mapping.items() if role not in said.mapping]
-        more += [f"{name} = {value}" for name, value in before.items() if name not in now and name in held]
-        more += ["side = load"] if (before["side"], now["side"]) == ("load", "motor") else []
-        if kept.sample_time is not None and said.sample_time is None:
-            more.append(f"sample_time = {kept.sample_time:g} s")
-        if more:
-            words = f"read by the saved profile {used}, which says {', '.join(more)}"
-            notes.append(Finding("note", "profile", words, remedy=FORGET))
-    if written and not notes:
-        words = f"how to read files with these columns is kept in the profile {written}"
-        notes.append(Finding("note", "profile", words, remedy=FORGET))
-    return tuple(notes)
 
 
 def _drive(reading: Reading) -> Drive:
