@@ -92,6 +92,7 @@ def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list
     InputError
         If the mapping names a column that is not there, or a unit that is none or of the wrong kind.
     """
+    mapping = meant(table, mapping)
     chosen = {role: _explicit(table, role, text) for role, text in mapping.items() if text.lower() != "none"}
     taken = {choice.column for choice in chosen.values()}
     names = {c.name: role_of(c.name, _unit_of(c)) for c in table.columns}
@@ -117,6 +118,38 @@ def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list
     return [chosen[role] for role in ROLES if role in chosen], findings
 
 
+def meant(table: Table, mapping: Mapping[str, str]) -> dict[str, str]:
+    """The mapping, where what is called a torque and has a unit of current is the current, which makes the torque.
+
+    Raises
+    ------
+    InputError
+        If another column is the current at once.
+    """
+    text = mapping.get("motor_torque", "none")
+    if not _is_current(table, text):
+        return dict(mapping)
+    other = mapping.get("current", text)
+    if other not in (text, "none"):
+        raise InputError(
+            f"{_as_said('torque', text)} is a current, and {_as_said('current', other)} names another; give one of them"
+        )
+    return {**mapping, "motor_torque": "none", "current": text}
+
+
+def _is_current(table: Table, text: str) -> bool:
+    """Whether a column as said has a unit of current: the one that is said, else its own."""
+    text = re.sub(r"@(motor|load)$", "", text)
+    column, unit = _find(table, text), ""
+    if column is None and ":" in text:
+        name, unit = (part.strip() for part in text.rsplit(":", 1))
+        column = _find(table, name)
+    if column is None:
+        return False
+    parsed = parse_unit(unit or _unit_of(column) or role_of(column.name).unit)
+    return parsed is not None and parsed.kind == "current"
+
+
 def _as_said(role: str, text: str) -> str:
     """An option ``--map``, in quotes where a shell asks for them."""
     return f"--map {role}={text}" if re.fullmatch(r"[\w.:·%/@-]+", text) else f"--map '{role}={text}'"
@@ -140,10 +173,10 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
         if parsed is None or parsed.kind not in KINDS[role]:
             what = "is not a unit that is known" if parsed is None else f"is a unit of {parsed.kind}"
             what = AMBIGUOUS.get(unit.lower(), what)
-            current = role == "motor_torque" and parsed is not None and parsed.kind in ("current", "voltage")
+            driven = role == "motor_torque" and parsed is not None and parsed.kind == "voltage"
             remedy = (
-                "map it as current and give --torque-constant"
-                if current
+                "map it as voltage and give --resistance and --torque-constant"
+                if driven
                 else f"{role} takes {spellings(KINDS[role])}"
             )
             raise InputError(f"{_as_said(role, text)}: {unit!r} {what}; {remedy}")

@@ -16,7 +16,7 @@ import numpy as np
 from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.readers import profiles
-from stickslip.readers._choose import Choice, choose, parse_mapping
+from stickslip.readers._choose import Choice, choose, meant, parse_mapping
 from stickslip.readers.convert import Drive, convert, times_of
 from stickslip.readers.table_columns import Column, Format, Table
 from stickslip.record import Record
@@ -144,8 +144,9 @@ def record_of(
     InputError
         As `read`.
     """
-    said = parse_mapping(mapping)
-    kept = {k: v for k, v in profile.mapping.items() if k not in said} if profile else {}
+    said = meant(table, parse_mapping(mapping))
+    before = meant(table, profile.mapping) if profile else {}
+    kept = {role: column for role, column in before.items() if role not in said}
     choices, findings = choose(table, {**kept, **said})
     choices = [_from_profile(c) if c.role in kept and c.source == "map" else c for c in choices]
     settings = profiles.merged([], drive or Drive(), sample_time, profile).drive

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.finding import Finding
-from stickslip.readers._choose import Choice, choose, parse_mapping
+from stickslip.readers._choose import Choice, choose, meant, parse_mapping
 from stickslip.readers._units import parse_unit
 from stickslip.readers.convert import EFFORT, MOTION, Drive, is_linear, unit_of
 from stickslip.readers.profiles import PUTS_OUT, STATEMENTS, Profile, Statement, sizes
@@ -85,7 +85,7 @@ def recall(
     now = set(given)
     now |= {name for said_now in tuple(now) for name in PUTS_OUT.get(said_now, ())}
     picked = {n: x for n, x in _latest(kept.said, digest).items() if n not in now}
-    choices, _ = choose(table, {**kept.mapping, **parse_mapping(mapping)})
+    choices, _ = choose(table, {**meant(table, kept.mapping), **meant(table, parse_mapping(mapping))})
     known = said.known() | {n: x for n, (x, _) in picked.items()}
     needs = needed(choices, table, known)
     if "lead" in needs and "lead" in picked and "gear_ratio" in picked:

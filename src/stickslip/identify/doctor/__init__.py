@@ -16,7 +16,17 @@ import numpy as np
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding, sorted_findings
-from stickslip.identify.doctor import change, excitation, physics, play, signals, spikes, timing, units
+from stickslip.identify.doctor import (
+    change,
+    excitation,
+    magnitude,
+    physics,
+    play,
+    signals,
+    spikes,
+    timing,
+    units,
+)
 from stickslip.identify.doctor.view import View
 from stickslip.identify.regression.regression import regress_axis
 from stickslip.identify.regression.regressions import Regress
@@ -29,7 +39,7 @@ FINAL = ("too-short", "no-clock")
 ERRORS = (
     *FINAL, "ambiguous-column", "backward-time", "duplicate-time", "missing-column", "mixed-units", "nan",
     "never-moved", "no-torque", "position-reference-unit", "position-unit", "position-wrap", "time-unit", "torque-sign",
-    "torque-unit", "velocity-mismatch", "velocity-sign", "velocity-unit",
+    "torque-magnitude", "torque-unit", "velocity-mismatch", "velocity-sign", "velocity-unit",
 )  # fmt: skip
 """Codes of what may make a record unusable, those of its reading among them."""
 FIRST: tuple[Callable[[View], Iterator[Finding]], ...] = (
@@ -40,6 +50,7 @@ CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
     *FIRST, timing.scale, timing.velocity_late, units.assumed, units.counted,
     units.degrees, units.turns, units.reference_scale, units.velocity_scale, units.too_fast, units.torque_scale,
     spikes.spikes, signals.wrapped, signals.repeated, signals.saturated, signals.supply, signals.quantised,
+    magnitude.unsigned,
     physics.sign, physics.skew, physics.gravity, play.backlash, change.changes, change.temperature, excitation.moved,
 )  # fmt: skip
 
@@ -48,6 +59,9 @@ CONSEQUENCES = {
     "position-wrap": (
         "torque-sign", "velocity-sign", "velocity-mismatch", "time-skew", "torque-timing", "gravity", "offset",
         "change", "backlash", "less-than-a-revolution", "no-reversal",
+    ),
+    "torque-magnitude": (
+        "torque-sign", "time-skew", "torque-timing", "gravity", "offset", "change", "backlash",
     ),
     "duplicate-time": (
         "torque-sign", "velocity-mismatch", "velocity-unit", "time-skew", "torque-timing", "change", "backlash",

@@ -25,6 +25,9 @@ FEWEST = 50
 """Rows in motion, away from the ends of the record, that a regression needs."""
 QUARTER = 90.0
 """Of a turn, in degrees, that a pendulum must swing over to be told from a spring."""
+IN_DEGREES, CLOSER, APART = 360.0 / math.tau, 0.5, 1.1
+"""Turns of 2 pi in 360; part of what these leave of the torque below which another number of turns explains it; and by
+how much that is another one."""
 BOTH = 0.05
 """Share of the moving rows in either direction below which friction is not told from a constant torque."""
 STRETCHES, SURE = 12, 3.0
@@ -223,10 +226,7 @@ def gravity(view: View) -> Iterator[Finding]:
             )
             return
         if _hangs_in_degrees(smooth, min(plain.rest, rest)):
-            message = (
-                "the mean torque comes back with 360, as gravity does with a turn: degrees rather than rad"
-            )
-            yield Finding("warning", "position-unit", message, remedy=f"say {view.mapped('position', 'deg')}")
+            yield _degrees_or_gear(view, smooth)
             return
     yield from _offset(view, smooth, plain)
 
@@ -284,6 +284,31 @@ def _hangs_in_degrees(smooth: Smooth, rest: float) -> bool:
     fit = _fit(smooth, 0, periodic=True, turn=360.0)
     amplitude, size = math.hypot(fit.values[4], fit.values[5]), float(np.std(smooth.torque))
     return fit.rest < 0.2 * rest and fit.explained > 0.9 and 0.1 * size < amplitude < 20.0 * size
+
+
+def _degrees_or_gear(view: View, smooth: Smooth) -> Finding:
+    """Of a torque that comes back as a pendulum's whose angle is in degrees may: whether a gear explains it better, or
+    as well, since the motor's angle is the load's times its ratio."""
+    far = float(np.ptp(smooth.position)) / (QUARTER / 360.0 * math.tau)
+    # A step is the ratio by which a pendulum over a turn leaves a hundredth of its torque.
+    ratios: Array = np.geomspace(1.5, max(far, 2.0 * IN_DEGREES), 150)
+    rests = [_fit(smooth, 0, periodic=True, turn=n * math.tau).rest for n in ratios]
+    best = float(ratios[int(np.argmin(rests))])
+    fine: Array = np.linspace(best / 1.04, 1.04 * best, 41)
+    rests = [_fit(smooth, 0, periodic=True, turn=n * math.tau).rest for n in fine]
+    best, least = float(fine[int(np.argmin(rests))]), min(rests)
+    seen = f"--gear-ratio {best:.3g} --side load --pendulum"
+    other = not 1.0 / APART < best / IN_DEGREES < APART
+    if other and least < CLOSER * _fit(smooth, 0, periodic=True, turn=360.0).rest:
+        turns = f"{best * math.tau:.4g} rad, {best:.3g} turns"
+        message = f"the mean torque comes back with {turns}: a pendulum behind a gear?"
+        return Finding("warning", "gravity", message, remedy=f"identify with {seen}, if such a gear is there")
+    message = (
+        f"the mean torque comes back with 360, as gravity does with a turn: degrees rather than rad, or the motor's "
+        f"angle before a gear of about {best:.2g}"
+    )
+    remedy = f"say {view.mapped('position', 'deg')} if it is in degrees, or identify with {seen}"
+    return Finding("warning", "position-unit", message, remedy=remedy)
 
 
 def _fit(
