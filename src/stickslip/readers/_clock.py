@@ -37,6 +37,8 @@ RATES = (
     "f_s",
 )
 
+COUNTERS, NEAR = (16, 24, 32), 4.0
+"""Bits of a counter of times, and steps by which it may miss the place where it would go on."""
 SAME = 0.01
 """Part of a stated period by which a column of times may differ from it without a word."""
 
@@ -64,7 +66,7 @@ def time_of(
         return np.arange(first.values.size, dtype=np.float64) * sample_time, 0.0, found
     if "time" in by_role:
         choice = by_role["time"]
-        time = columns[choice.column].values
+        time = _counted_on(columns[choice.column].values, choice, found)
         unit = parse_unit(choice.unit)
         factor = unit.factor if unit is not None else _epoch(time)
         if unit is None and factor != 1.0:
@@ -147,6 +149,28 @@ def _epoch(time: Array) -> float:
     finite = time[np.isfinite(time)]
     size = float(np.median(finite)) if finite.size else 0.0
     return next((f for f, low in ((1e-9, 1e18), (1e-6, 1e15), (1e-3, 1e12)) if low <= size < 10.0 * low), 1.0)
+
+
+def _counted_on(time: Array, choice: Choice, found: list[Finding]) -> Array:
+    """Times of a counter that starts anew at a power of two, counted on; others as they are."""
+    known = np.flatnonzero(np.isfinite(time))
+    ticks: Array = time[known]
+    steps = np.diff(ticks)
+    anew = steps < 0.0
+    if not np.any(anew) or np.any(ticks != np.round(ticks)) or np.min(ticks) < 0.0:
+        return time
+    usual = float(np.median(steps[~anew])) if not np.all(anew) else 0.0
+    for bits in COUNTERS:
+        size = 2.0**bits
+        if np.max(ticks) < size and np.all(np.abs(steps[anew] + size - usual) <= NEAR * usual):
+            out = time.copy()
+            out[known[1:]] += size * np.cumsum(anew)
+            times = int(np.count_nonzero(anew))
+            often = "once" if times == 1 else f"{times} times"
+            said = f"time {choice.column!r} is a counter of {bits} bits and starts anew {often}: it was counted on"
+            found.append(Finding("note", "time-wrap", said))
+            return out
+    return time
 
 
 def _from_start(time: Array, factor: float, found: list[Finding]) -> tuple[Array, float, list[Finding]]:

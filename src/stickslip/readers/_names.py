@@ -1,12 +1,14 @@
 """What a column's name says: its quantity, its unit, its axis and its side.
 
-English, German and the names drives and controllers use (CiA 402 objects, TwinCAT, Sinamics, Sercos, Logix, AKD,
-ODrive, Dynamixel, ROS). A name is cut into words; a role is known by one of its words or by its whole spelling.
+English, German, the main words in French, Italian and Spanish, and the names drives and controllers use (CiA 402
+objects, TwinCAT, Sinamics, Sercos, Logix, AKD, ODrive, Dynamixel, ROS). A name is cut into words; a role is known by one
+of its words or by its whole spelling.
 """
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from dataclasses import dataclass
 
 from stickslip.readers._units import Unit, parse_unit
@@ -65,20 +67,24 @@ def _words(text: str) -> frozenset[str]:
 
 WORDS = _table(
     """
-    time: time zeit timestamp zeitstempel datetime uhrzeit elapsed seconds clock stamp
+    time: time zeit timestamp zeitstempel datetime uhrzeit elapsed seconds clock stamp temps tempo tiempo
     position: position positions pos angle winkel lage weg displacement deflection theta phi posn encoder enc
         resolver lageist lagesoll stellung rotation stroke hub posist possoll istpos sollpos istposition
         sollposition istlage solllage lageistwert lagesollwert actpos setpos lastposition qpos drehwinkel
-        motorposition ptpos
+        motorposition ptpos schlittenposition achsposition achsenposition wagenposition positionsistwert
+        positionssollwert posizione posicion
     velocity: velocity velocities vel velo speed geschwindigkeit drehzahl omega qvel nist nsoll vist vsoll
         drehzahlistwert drehzahlsollwert istdrehzahl solldrehzahl actvelo setvelo istgeschwindigkeit
-        sollgeschwindigkeit geschw dtheta dphi rpm
+        sollgeschwindigkeit geschw dtheta dphi rpm vitesse velocita velocidad
+        motordrehzahl
     acceleration: acceleration acc accel beschleunigung ddtheta acceler
     motor_torque: torque torques trq tau drehmoment moment effort kraft force istmoment sollmoment
         momentenistwert drehmomentistwert torqueforce tq thrust mist motorkraft antriebskraft istkraft
-        sollkraft
+        sollkraft momentistwert momentsollwert motormoment motordrehmoment
+        antriebsmoment couple coppia
     friction_torque: friction reibung reibmoment reibkraft reibungsmoment reibungskraft
-    current: current currents strom iq amps iqist stromistwert iststrom motorstrom cur amperage
+    current: current currents strom iq amps iqist stromistwert iststrom motorstrom cur amperage courant
+        corrente corriente
     voltage: voltage volts spannung volt uq motorspannung vir
     supply: supply vbus vdc udc ubat vbat battery dclink vsupply versorgung versorgungsspannung zwischenkreis
         zwischenkreisspannung
@@ -91,7 +97,7 @@ WORDS = _table(
 
 WHOLE = _table(
     """
-    time: t ts secs s sec tout
+    time: t ts secs s sec tout ms msec millis
     position: q qm q_m x y th 6064 607a_actual pl.fb s-0-0051 s-0-0053 px x_m qmes q_act pos_estimate
         encoder.pos_estimate p_act r2521 phi_m theta_m theta_l q_l q_meas
     velocity: v w dq qd_m dqm dx qdot n 606c vl.fb s-0-0040 vx vel_estimate r0061 r61 r0063 r63 dq_act v_act
@@ -119,12 +125,12 @@ OF_REFERENCE = _words(
     cmd command commanded demand demanded des desired drehzahlsollwert fuehrungsgroesse goal input
     lagesoll lagesollwert nsoll planned possoll ref reference set setpoint setpos setvelo soll
     solldrehzahl sollgeschwindigkeit sollkraft solllage sollmoment sollpos sollposition sollwert target trajectory
-    vorgabe vsoll ziel
+    vorgabe vsoll ziel consigne momentsollwert positionssollwert riferimento
     """
 )
 """Words that say that a quantity is a reference, not measured."""
 
-SECONDS = frozenset(["sec", "secs"])
+SECONDS = frozenset(["sec", "secs", "ms", "msec", "millis"])
 """Names of a time that are its unit. A bare "s" may as well be a displacement (and does not beat a "t")."""
 ERROR = frozenset(["deviation", "diff", "err", "error", "fehler", "following", "lag"])
 LOAD_SIDE = frozenset(
@@ -150,7 +156,7 @@ MOTOR_SIDE = frozenset(["antrieb", "drive", "mot", "motor", "motorseitig", "roto
 SKIP = _words(
     """
     achse act actual axes axis estimate fb feedback filtered internal ist istwert joint meas measured mes
-    present raw value
+    present raw value attuale mesure mesuree reale reel reelle
     """
 )
 _NO_SIGNAL = _words(
@@ -167,7 +173,7 @@ REFERENCED = {
 }
 
 IN_BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]{1,24}?)\s*[\])>}]")
-AFTER_IN = re.compile(r"\s+in\s+(\S{1,12})\s*$|\s*/\s*(\S{1,12})\s*$", re.IGNORECASE)
+AFTER_IN = re.compile(r"\s+in\s+(\S{1,12})\s*$|\s*[/,]\s*(\S{1,12})\s*$", re.IGNORECASE)
 CAMEL = re.compile(r"(?<=[a-zäöüß])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 UMLAUTS = str.maketrans(
     {
@@ -210,8 +216,9 @@ class Name:
 
 def words(name: str) -> list[str]:
     """The words of a name: at signs, at capitals and between letters and digits, in lower case."""
-    cut = CAMEL.sub(" ", name)
-    return [w for w in re.split(r"[^0-9a-z]+", cut.lower().translate(UMLAUTS)) if w]
+    cut = CAMEL.sub(" ", name).lower().translate(UMLAUTS)
+    plain = "".join(c for c in unicodedata.normalize("NFKD", cut) if not unicodedata.combining(c))
+    return [w for w in re.split(r"[^0-9a-z]+", plain) if w]
 
 
 def role_of(name: str, unit: str = "") -> Name:
@@ -222,7 +229,8 @@ def role_of(name: str, unit: str = "") -> Name:
     role, sure = _role(bare, parts)
     parsed = parse_unit(stated) if stated else None
     if not role and parsed is not None:
-        role, sure = _role_by_unit(parts, parsed), 1
+        role = _role_by_unit(parts, parsed)
+        sure = int(OF_REFERENCE.isdisjoint(parts))
     if role == "motor_torque" and parsed is not None and parsed.kind == "current":
         role = "current"
     if role and parsed is not None and parsed.kind not in KINDS[role]:
@@ -347,7 +355,7 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
 def _role_by_unit(parts: list[str], unit: Unit) -> str:
     """What an unknown name with a telling unit must be; empty where the unit tells too little."""
     if not OF_REFERENCE.isdisjoint(parts):
-        return ""
+        return "motor_torque" if unit.kind == "torque" else ""
     return {"angular velocity": "velocity", "torque": "motor_torque", "current": "current", "voltage": "voltage",
             "temperature": "temperature", "angle": "position"}.get(unit.kind, "")  # fmt: skip
 

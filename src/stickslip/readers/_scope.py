@@ -49,8 +49,9 @@ def groups(header: Sequence[Sequence[str]], width: int) -> tuple[int, ...] | Non
 
 def columns(header: Sequence[Sequence[str]], starts: tuple[int, ...], values: Array) -> tuple[Column, ...]:
     """The value columns, each with the clock of its group."""
-    named = _row(header, "name") or _row(header, "symbolname") or _widest(header, values.shape[1])
-    units, periods = _row(header, "unit"), _row(header, "sampletime[ms]")
+    width = values.shape[1]
+    named = _row(header, "name", width) or _row(header, "symbolname", width) or _widest(header, width)
+    units, periods = _row(header, "unit", width), _row(header, "sampletime[ms]", width)
     ends = (*starts[1:], values.shape[1])
     out: list[Column] = []
     for start, end in zip(starts, ends, strict=True):
@@ -91,8 +92,9 @@ def _seconds(ticks: Array, period_ms: str, label: str) -> Array:
     return ticks * (period * 1e-3 if step == 1.0 else 1e-3)
 
 
-def _row(header: Sequence[Sequence[str]], key: str) -> Sequence[str]:
-    found = [row for row in header if row and row[0].strip().lower() == key]
+def _row(header: Sequence[Sequence[str]], key: str, width: int) -> Sequence[str]:
+    """The row of a key, one cell a column: a shorter one is about the scope, as is "Name  Project"."""
+    found = [row for row in header if len(row) >= width - 1 and row[0].strip().lower() == key]
     return max(found, key=len) if found else ()
 
 

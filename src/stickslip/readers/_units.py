@@ -38,7 +38,8 @@ PLAIN: dict[str, Unit] = {
     "rev": Unit("angle", TURN), "revs": Unit("angle", TURN), "revolution": Unit("angle", TURN),
     "revolutions": Unit("angle", TURN), "turn": Unit("angle", TURN), "turns": Unit("angle", TURN),
     "umdr": Unit("angle", TURN), "umdrehung": Unit("angle", TURN), "umdrehungen": Unit("angle", TURN),
-    "U": Unit("angle", TURN),
+    "U": Unit("angle", TURN), "giri": Unit("angle", TURN), "giro": Unit("angle", TURN), "tr": Unit("angle", TURN),
+    "tour": Unit("angle", TURN), "tours": Unit("angle", TURN),
     # Counts of an encoder
     **dict.fromkeys(
         ("counts", "count", "cnt", "cnts", "cts", "inc", "incs", "incr", "increment", "increments", "ink", "inkr",

@@ -11,9 +11,9 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers._choose import Choice
 from stickslip.readers._clock import on_clock, time_of, times_of
-from stickslip.readers._names import KINDS
+from stickslip.readers._names import KINDS, role_of
 from stickslip.readers._units import SI, Unit, parse_unit
-from stickslip.readers.table_columns import Array, Table
+from stickslip.readers.table_columns import Array, Column, Table
 from stickslip.record import Record
 
 __all__ = ["Drive", "convert", "times_of"]
@@ -154,10 +154,12 @@ def convert(
     said += _idle_gear(listed, drive)
     derived, more = _torque_from_current(channels, units, drive, linear)
     said += more
+    unused = [c for c in table.columns if c.name not in {e["column"] for e in listed}]
     reading = {
         "format": table.format,
         "columns": listed,
-        "unused": [name for name in columns if name not in {c["column"] for c in listed}],
+        "unused": [c.name for c in unused],
+        "drives": [c.name for c in unused if _drives(c)],
         "constants": dict(table.constants),
         "drive": drive.known(),
         "time_origin": origin,
@@ -167,6 +169,13 @@ def convert(
 
 
 # ---- units --------------------------------------------------------------------------------------------------
+
+
+def _drives(column: Column) -> bool:
+    """Whether a column may say what drives the axis: its unit is one of torque, force, current or a share."""
+    unit = column.unit if parse_unit(column.unit) else role_of(column.name).unit
+    parsed = parse_unit(unit)
+    return parsed is not None and parsed.kind in ("torque", "force", "current", "share")
 
 
 def is_linear(by_role: dict[str, Choice]) -> bool:

@@ -8,7 +8,6 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -16,35 +15,26 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers import _scope
+from stickslip.readers._cells import OF_DAY, cell, moment, over_midnight
 from stickslip.readers._units import parse_unit
 from stickslip.readers.table_columns import Array, Column, Format, Table
 
-DIALECTS = (("\t", "."), ("\t", ","), (";", "."), (";", ","), (",", "."), ("|", "."), (" ", "."), (" ", ","))
-"""Delimiter and decimal sign, in the order in which ties are decided."""
+DIALECTS = (
+    ("\t", "."),
+    ("\t", ","),
+    (";", "."),
+    (";", ","),
+    (",", "."),
+    ("|", "."),
+    (" ", "."),
+    (" ", ","),
+    (",", ","),
+)
+"""Delimiter and decimal sign, in the order in which ties are decided; a comma is both where cells stand in quotes."""
 SAMPLE = 400
 """Lines from which the dialect is told."""
 USUAL = 0.8
 """Part of the lines of a sample in which a column of numbers holds one: header and footer are the rest"""
-NO_VALUE = frozenset(
-    (
-        "",
-        "nan",
-        "n/a",
-        "na",
-        "#n/a",
-        "null",
-        "none",
-        "-",
-        "--",
-        "nat",
-        "-nan",
-        "nan(ind)",
-        "-nan(ind)",
-        "1.#qnan",
-        "?",
-    )
-)
-TRUTH = {"true": 1.0, "false": 0.0, "on": 1.0, "off": 0.0, "wahr": 1.0, "falsch": 0.0}
 COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s*")
 
 
@@ -92,8 +82,13 @@ def read(path: Path) -> Table:
     names, units = _names(header, dialect.width)
     if values.shape[1] and np.isnan(values[:, -1]).all() and not names[-1]:
         values = values[:, :-1]  # a delimiter ends every line
+    clocks = _clocks(body, dialect)
     columns = tuple(
-        Column(name or f"column {i + 1}", np.ascontiguousarray(values[:, i]), unit)
+        Column(
+            name or f"column {i + 1}",
+            over_midnight(values[:, i], clocks.get(i)),
+            "s" if i in clocks else unit,
+        )
         for i, (name, unit) in enumerate(zip(names[: values.shape[1]], units, strict=False))
         if i not in dialect.words
     )
@@ -213,37 +208,11 @@ def _without_footer(body: list[str], dialect: Dialect) -> tuple[list[str], list[
 # ---- cells to numbers ---------------------------------------------------------------------------------------
 
 
-def cell(text: str, decimal: str) -> float | None:
-    """A cell's number; NaN where it says that there is none, None where it is something else."""
-    word = text.strip().strip('"').strip()
-    if decimal == "," and "," in word:
-        word = word.replace(",", ".") if "." not in word else ""
-        if not word:
-            return None
-    try:
-        return float(word) if "_" not in word else None
-    except ValueError:
-        pass
-    lower = word.lower()
-    if lower in NO_VALUE:
-        return math.nan
-    if lower in TRUTH:
-        return TRUTH[lower]
-    return _moment(word)
-
-
-def _moment(word: str) -> float | None:
-    """A date with time, as s since 1970."""
-    if len(word) < 16 or not word[:4].isdigit():
-        return None
-    try:
-        moment = datetime.fromisoformat(word)
-    except ValueError:
-        return None
-    try:
-        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
-    except (OverflowError, ValueError, OSError):
-        return None
+def _clocks(body: Sequence[str], dialect: Dialect) -> dict[int, bool]:
+    """Columns of dates or times of day, told by their first cell, and whether they start anew with the day."""
+    first = [c.strip().strip('"').strip() for c in dialect.split(body[0])] if body else []
+    told = {i: bool(OF_DAY.fullmatch(c)) for i, c in enumerate(first) if ":" in c and moment(c) is not None}
+    return {i: daily for i, daily in told.items() if i not in dialect.words}
 
 
 def _values(body: Sequence[str], dialect: Dialect, start: int) -> tuple[Array, list[Finding]]:

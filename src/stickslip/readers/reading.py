@@ -37,6 +37,9 @@ FORMATS = (
 PER_MILLE = re.compile(r"(?i)(?<![0-9a-f])60(?:77|b2)(?![0-9a-f])")
 """Objects of CiA 402 (IEC 61800-7-201) in thousandths of the rated torque: actual torque, torque offset."""
 
+COUNT_RATE = re.compile(r"(?i)(?<![0-9a-f])60(?:6b|6c|ff)(?![0-9a-f])")
+"""Its velocities, in counts per second where nothing else is set."""
+
 
 def formats() -> list[Format]:
     """Every registered format."""
@@ -175,6 +178,8 @@ def told(choices: Sequence[Choice], table: Table, drive: Drive) -> list[Choice]:
         unit = ""
         if choice.role in ("position", "position_reference") and "counts_per_rev" in known:
             unit = "counts"
+        elif choice.role in ("velocity", "velocity_reference") and "counts_per_rev" in known:
+            unit = "counts/s" if COUNT_RATE.search(choice.column) else ""
         elif "rated_torque" in known and PER_MILLE.search(choice.column):
             unit = "permille"
         if unit and not choice.unit and _whole(columns[choice.column].values):

@@ -39,11 +39,14 @@ def channels(view: View) -> Iterator[Finding]:
                 remedy=screw if view.effort == "N" else "give --torque-constant NM_PER_AMPERE",
             )
         else:
+            maybe = view.unused_drives
+            listed = ", ".join(repr(name) for name in maybe[:4])
+            which = f" (not used, with a unit that may say it: {listed})" if maybe else ""
             yield Finding(
                 "warning",
                 "missing-column",
                 "there is no torque, force or current: only a machine model can replace it",
-                remedy=f"if a column holds it, say --map torque=COLUMN:{view.effort}",
+                remedy=f"if a column{which} holds it, say --map torque=COLUMN:{view.effort}",
             )
 
 

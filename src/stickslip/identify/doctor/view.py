@@ -82,6 +82,11 @@ class View:
         listed: list[dict[str, Any]] = self.record.meta.get("reading", {}).get("columns", [])
         return {c["channel"]: Column(c["column"], c["unit"], c["source"] != "assumed") for c in listed}
 
+    @property
+    def unused_drives(self) -> list[str]:
+        """Columns that no channel is made of, with a unit of torque, force, current or a share."""
+        return list(self.record.meta.get("reading", {}).get("drives", []))
+
     def stated(self, channel: str) -> bool:
         """Whether anybody states the channel's unit."""
         return self.columns[channel].stated if channel in self.columns else True

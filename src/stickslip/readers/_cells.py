@@ -1,0 +1,87 @@
+"""The number in a cell of text: decimal commas, signs between thousands, truth, dates and times of day."""
+
+from __future__ import annotations
+
+import math
+import re
+from datetime import UTC, datetime
+
+import numpy as np
+
+from stickslip.readers.table_columns import Array
+
+NO_VALUE = frozenset(
+    (
+        "",
+        "nan",
+        "n/a",
+        "na",
+        "#n/a",
+        "null",
+        "none",
+        "-",
+        "--",
+        "nat",
+        "-nan",
+        "nan(ind)",
+        "-nan(ind)",
+        "1.#qnan",
+        "?",
+    )
+)
+TRUTH = {"true": 1.0, "false": 0.0, "on": 1.0, "off": 0.0, "wahr": 1.0, "falsch": 0.0}
+THOUSANDS = {
+    ".": re.compile(r"([-+]?\d{1,3}(?:[,'\u00a0\u202f]\d{3})+)\.(\d*)"),
+    ",": re.compile(r"([-+]?\d{1,3}(?:[.'\u00a0\u202f]\d{3})+),(\d*)"),
+}
+"""Numbers with signs between the thousands, by the decimal sign."""
+OF_DAY = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
+DAY = 86400.0
+
+
+def cell(text: str, decimal: str) -> float | None:
+    """A cell's number; NaN where it says that there is none, None where it is something else."""
+    word = text.strip().strip('"').strip()
+    if (match := THOUSANDS[decimal].fullmatch(word)) is not None:
+        word = re.sub(r"[^0-9+-]", "", match[1]) + "." + match[2]
+    elif decimal == "," and "," in word:
+        word = word.replace(",", ".") if "." not in word else ""
+        if not word:
+            return None
+    try:
+        return float(word) if "_" not in word else None
+    except ValueError:
+        pass
+    lower = word.lower()
+    if lower in NO_VALUE:
+        return math.nan
+    if lower in TRUTH:
+        return TRUTH[lower]
+    return moment(word)
+
+
+def moment(word: str) -> float | None:
+    """A date with time, as s since 1970; a time of day, as s since midnight."""
+    if (match := OF_DAY.fullmatch(word)) is not None:
+        return 3600.0 * int(match[1]) + 60.0 * int(match[2]) + float(match[3].replace(",", "."))
+    if len(word) < 16 or not word[:4].isdigit():
+        return None
+    try:
+        moment = datetime.fromisoformat(word)
+    except ValueError:
+        return None
+    try:
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    except (OverflowError, ValueError, OSError):
+        return None
+
+
+def over_midnight(values: Array, daily: bool | None) -> Array:
+    """A column; of times of day, those of the next day counted on."""
+    if not daily:
+        return np.ascontiguousarray(values)
+    known = np.flatnonzero(np.isfinite(values))
+    days = np.cumsum(np.diff(values[known], prepend=values[known[:1]]) < -0.5 * DAY)
+    out = values.copy()
+    out[known] += DAY * days
+    return out

@@ -1,0 +1,52 @@
+"""Names that drives' tools write in other languages, and what is said where none is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.readers import Drive, read
+from stickslip.readers._names import role_of
+from stickslip.readers._units import parse_unit
+
+NAMES = {
+    "Momentistwert [%]": "motor_torque", "Motormoment": "motor_torque", "Schlittenposition [mm]": "position",
+    "M_soll[Nm]": "motor_torque", "Temps (ms)": "time", "Couple réel (%)": "motor_torque",
+    "Vitesse réelle (mm/s)": "velocity", "Tempo [s]": "time", "Posizione [mm]": "position",
+    "Velocità [giri/min]": "velocity", "Coppia [Nm]": "motor_torque", "Position réelle (mm)": "position",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "role"), NAMES.items(), ids=NAMES)
+def test_what_a_name_says(name, role):
+    assert role_of(name).role == role
+
+
+def test_a_measured_torque_goes_before_a_commanded_one(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t [s],q [rad],M_soll[Nm],M_ist[Nm]\n" + "".join(f"{k},{k},5,{k}\n" for k in range(9)))
+    assert read(path)["motor_torque"][3] == 3.0
+
+
+def test_giri_are_turns():
+    unit = parse_unit("giri/min")
+    assert unit is not None
+    assert unit.factor == pytest.approx(2.0 * np.pi / 60.0)
+
+
+def test_unused_columns_with_a_unit_of_torque_are_named():
+    """The message did not say which column might hold it."""
+    t = np.arange(400) * 1e-3
+    said = str(ss.doctor({"time [s]": t, "q [rad]": np.sin(9.0 * t), "Kanal 7 [%]": t, "Kanal 8 [V]": t}))
+    assert "(not used, with a unit that may say it: 'Kanal 7 [%]')" in said
+
+
+def test_the_velocity_of_cia_402_is_in_counts_where_its_position_is(tmp_path):
+    """0x606C was taken in rad/s beside a position in counts."""
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{k},{4096 * k},{4096000 + k % 2}\n" for k in range(30))
+    path.write_text("t_ms,0x6064:00 Position actual value,0x606C:00 Velocity actual value\n" + rows)
+    record = read(path, drive=Drive(counts_per_rev=4096))
+    assert record["position"][1] == pytest.approx(2.0 * np.pi)
+    assert record["velocity"][0] == pytest.approx(2.0 * np.pi * 1e3)
