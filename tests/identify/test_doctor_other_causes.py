@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+import stickslip as ss
 from stickslip import Record
 from stickslip.identify.doctor import examine
 
@@ -66,3 +67,31 @@ def test_a_torque_without_its_sign_is_an_error(weight):
 def test_a_weight_that_is_always_held_is_no_magnitude(weight):
     found = examine(moved(weight, magnitude=False))
     assert "torque-magnitude" not in {f.code for f in found.findings}
+
+
+def test_a_counter_of_many_turns_is_not_counted_within_one():
+    """A wrap of 512 turns was said to be "counted within one turn"."""
+    t = np.arange(0.0, 4.0, 1e-3)
+    far = 512.0 * math.tau
+    q = 50.0 * np.sin(2.0 * np.pi * 0.5 * t) + 0.5 * far
+    for turns, said in (
+        (512.0, "its counter starts anew, after 512 turns"),
+        (1.0, "it is counted within one turn"),
+    ):
+        position = np.mod(q, turns * math.tau) if turns == 1.0 else np.mod(q + 0.5 * far, far)
+        record = Record(t, {"position": position, "motor_torque": np.cos(np.pi * t)}, UNITS)
+        (found,) = [f for f in examine(record).findings if f.code == "position-wrap"]
+        assert found.message.endswith(said)
+
+
+@pytest.mark.parametrize(("column", "level"), [("Torque command [Nm]", "note"), ("Torque [Nm]", "warning")])
+def test_a_commanded_torque_at_its_limit_is_what_acts(column, level):
+    """That what was cut off is lost was said of a command, and the result doubted for it."""
+    t = np.arange(0.0, 4.0, 1e-3)
+    torque = np.clip(3.0 * np.sin(2.0 * np.pi * t), -2.2, 2.2)
+    position = np.cumsum(np.cumsum(torque - np.mean(torque))) * 1e-6 / 1e-3
+    found = ss.doctor({"time [s]": t, "position [rad]": position, column: torque}).findings
+    (at_limit,) = [f for f in found if f.code == "saturation"]
+    assert at_limit.level == level
+    assert ("what was cut off is lost" in at_limit.line()) == (level == "warning")
+    assert "2.2" in at_limit.message

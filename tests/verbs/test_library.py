@@ -47,6 +47,18 @@ def numbers(found: ss.IdentificationResult) -> dict[str, tuple[float, float, flo
     return {e.name: (e.value, *e.interval) for e in found.parameters.values()}
 
 
+def test_a_mapping_of_arguments_names_means_what_the_arguments_mean(signals: dict[str, np.ndarray]) -> None:
+    """The same arrays in a mapping were doubted for units that nobody stated."""
+    told = ss.doctor(dict(signals))
+    assert "assumed-unit" not in {f.code for f in told.findings}
+    assert told.findings == ss.doctor(**signals).findings
+    assert ss.read(dict(signals), units={"position": "deg"})["position"][-1] == pytest.approx(
+        np.radians(signals["position"][-1])
+    )
+    other = {"q": signals["position"], **{n: x for n, x in signals.items() if n != "position"}}
+    assert "assumed-unit" in {f.code for f in ss.doctor(other).findings}
+
+
 def test_the_same_log_gives_the_same_numbers_from_the_command_line_and_from_python(
     log: Path, result: ss.IdentificationResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

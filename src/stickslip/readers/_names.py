@@ -1,8 +1,8 @@
 """What a column's name says: its quantity, its unit, its axis and its side.
 
 English, German, the main words in French, Italian and Spanish, and the names drives and controllers use (CiA 402
-objects, TwinCAT, Sinamics, Sercos, Logix, AKD, ODrive, Dynamixel, ROS). A name is cut into words; a role is known by one
-of its words or by its whole spelling.
+objects, TwinCAT, Sinamics, Sercos, Logix, AKD, ODrive, Dynamixel, ROS). A name is cut into words; a role is known by
+one of its words or by its whole spelling.
 """
 
 from __future__ import annotations
@@ -236,6 +236,11 @@ def role_of(name: str, unit: str = "") -> Name:
     if role and parsed is not None and parsed.kind not in KINDS[role]:
         role, sure = "", 0
     return Name(role, sure if role else 0, stated, axis, _side(parts, role))
+
+
+def commanded(name: str) -> bool:
+    """Whether a name says that what it names is commanded, not measured."""
+    return not OF_REFERENCE.isdisjoint(words(name))
 
 
 def motor_force(name: str, unit: str = "") -> Name | None:

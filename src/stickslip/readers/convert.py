@@ -11,7 +11,7 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers._choose import Choice
 from stickslip.readers._clock import on_clock, time_of, times_of
-from stickslip.readers._names import KINDS, role_of
+from stickslip.readers._names import KINDS, commanded, role_of
 from stickslip.readers._units import SI, Unit, parse_unit
 from stickslip.readers.table_columns import Array, Column, Table
 from stickslip.record import Record
@@ -143,12 +143,14 @@ def convert(
         said += resampled
         channels[role] = scale * values + (unit.offset if unit.offset else 0.0)
         units[role] = target
-        entry = {
+        entry: dict[str, Any] = {
             "channel": role,
             "column": choice.column,
             "unit": choice.unit or target,
             "source": choice.source,
         }
+        if role in ("motor_torque", "current") and commanded(choice.column):
+            entry["commanded"] = True
         listed.append({**entry, "factor": scale, "side": choice.side or "motor", "steps": steps})
     said += _one_kind(channels, units, listed, drive)
     said += _idle_gear(listed, drive)

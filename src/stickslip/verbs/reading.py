@@ -189,6 +189,8 @@ def open_log(
     check_reading(reading)
     said = cast("Mapping[str, Any]", reading)
     signals = {SHORT.get(n, n): said[n] for n in SIGNALS if said.get(n) is not None}
+    if not signals and (arrays := _arrays_in(log, reading)):
+        log, signals = None, arrays
     if signals:
         if log is not None:
             given = [n for n in SIGNALS if said.get(n) is not None]
@@ -208,6 +210,15 @@ def open_log(
     if isinstance(log, (str, os.PathLike)):
         return _of_file(Path(cast("str", log)), reading, accept)
     return Opened(_part(_of_data(log, reading), reading, "the log"))
+
+
+def _arrays_in(log: Any, reading: Reading) -> dict[str, ArrayLike]:
+    """The signals of a mapping that has nothing but arguments' names: they mean what the arguments mean."""
+    if not isinstance(log, Mapping) or any(reading.get(name) for name in ("map", "profile", "beside")):
+        return {}
+    arrays = cast("Mapping[Any, ArrayLike]", log)
+    known = all(name == "time" or name in SIGNALS for name in arrays) and not {"t", "time"} <= arrays.keys()
+    return {SHORT.get(str(n), str(n)): values for n, values in arrays.items()} if known else {}
 
 
 def _of_signals(signals: Mapping[str, ArrayLike], reading: Reading) -> Record:

@@ -69,6 +69,9 @@ def saturated(view: View) -> Iterator[Finding]:
         at, limits = tops
         share, index = float(np.mean(at)), int(np.flatnonzero(view.usable)[np.flatnonzero(at)[0]])
         unit = view.record.units[channel]
+        if view.commanded(channel):
+            yield _limited_command(channel, limits, unit, share)
+            continue
         yield Finding(
             "warning",
             "saturation",
@@ -76,6 +79,16 @@ def saturated(view: View) -> Iterator[Finding]:
             row(index, view),
             "reduce the demand, or leave these rows out with --leave-out A:B: what was cut off is lost",
         )
+
+
+def _limited_command(channel: str, limits: str, unit: str, share: float) -> Finding:
+    """That a command stands at the limit that its drive set it: nothing of it was cut off afterwards."""
+    message = (
+        f"{channel} is commanded and stands at the drive's own limit of {limits} {unit} in {100 * share:.3g} % of the "
+        "rows: this is what acts, nothing is lost"
+    )
+    remedy = "keep these rows; where --loop gives the controller, give it this limit, too"
+    return Finding("note", "saturation", message, remedy=remedy)
 
 
 def _outrun(view: View, velocity: Array, at: Mask) -> bool:
@@ -253,7 +266,7 @@ def wrapped(view: View) -> Iterator[Finding]:
         yield Finding(
             "error",
             "position-wrap",
-            f"position jumps {at.size} times by {size:.4g} {unit}: it is counted within one turn",
+            f"position jumps {at.size} times by {size:.4g} {unit}: {_counted_within(size, unit, turn)}",
             row(index, view),
             "say --unwrap to count it on, or log the position without overflow",
         )
@@ -265,6 +278,14 @@ def wrapped(view: View) -> Iterator[Finding]:
             row(index, view),
             f"leave these rows out, such as --leave-out {view.file_rows[index]}, or check the encoder",
         )
+
+
+def _counted_within(size: float, unit: str, turn: float | None) -> str:
+    """What a position that jumps by its whole range is: counted within a turn, or by a counter of some turns."""
+    if turn is not None:
+        return "it is counted within one turn"
+    turns = f", after {size / math.tau:.4g} turns" if unit == "rad" else ""
+    return f"its counter starts anew{turns}"
 
 
 def _driven(view: View, position: Array, at: Any, spiky: Any) -> Any:

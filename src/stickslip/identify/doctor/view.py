@@ -29,11 +29,13 @@ MAX_ROWS = 200_000
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """How a channel was read: the column in the file, and whether anybody states its unit."""
+    """How a channel was read: the column in the file, whether anybody states its unit, whether its name says that it
+    is a command."""
 
     name: str
     unit: str
     stated: bool
+    commanded: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +82,10 @@ class View:
     def columns(self) -> dict[str, Column]:
         """How every channel was read; a record that was not read from a file states its units."""
         listed: list[dict[str, Any]] = self.record.meta.get("reading", {}).get("columns", [])
-        return {c["channel"]: Column(c["column"], c["unit"], c["source"] != "assumed") for c in listed}
+        return {
+            c["channel"]: Column(c["column"], c["unit"], c["source"] != "assumed", c.get("commanded", False))
+            for c in listed
+        }
 
     @property
     def unused_drives(self) -> list[str]:
@@ -90,6 +95,12 @@ class View:
     def stated(self, channel: str) -> bool:
         """Whether anybody states the channel's unit."""
         return self.columns[channel].stated if channel in self.columns else True
+
+    def commanded(self, channel: str) -> bool:
+        """Whether the column's name says that it is a command."""
+        if channel == "motor_torque" and self.from_current:
+            channel = "current"
+        return channel in self.columns and self.columns[channel].commanded
 
     def name(self, channel: str) -> str:
         """The channel's column in the file, for a remedy."""
