@@ -150,4 +150,10 @@ def print_columns(opened: Opened) -> None:
     if opened.used:
         print(f"profile: {opened.used}")
     if opened.written:
-        print(f"profile written: {opened.written} (the next file with these columns is read the same way)")
+        from stickslip.readers import profiles
+
+        named = opened.written.parent != profiles.folder()
+        holds = "the next file with these columns is read the same way"
+        if not named:
+            holds = "the columns mean the same in the next file with their names; numbers of the drive are this file's"
+        print(f"profile written: {opened.written} ({holds})")
