@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ RATE, INERTIA = 1000.0, 1.35e-3
 SPEEDS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 80.0, 150.0)
 
 
-def staircase(root: float) -> dict[str, np.ndarray]:
+def staircase(root: float) -> dict[str, Any]:
     """Steps of 0.8 s in both directions, twice; level, viscous part, and one with the root of the speed."""
     up = np.concatenate([np.full(800, v) for v in SPEEDS])
     way = np.concatenate([np.zeros(300), up, np.zeros(300), -up])
