@@ -3,15 +3,15 @@
 The linear part has moved under the contact's springs alone (`Tried`); here is solved what the law says beside them, G,
 linear in time, and the states are corrected for it.
 
-**A law that jumps at rest** is held while it can hold, and landed on and left in the shortest sub-steps. One that is
-stiff (a steep slope through rest) takes G constant, with its value at the end, which damps what is not resolved.
+A law that is stiff (a steep slope through rest) takes G constant, with its value at the end, which damps what is not
+resolved. One that jumps at rest moves by `stickslip.simulation.machine.holding`.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from stickslip.jit import call_holding, call_step, kernel, pointer
+from stickslip.jit import call_step, kernel, pointer
 from stickslip.simulation.machine.plant import FINEST, FIRST, LAST, SLOTS, SPRINGS, Plant
 from stickslip.simulation.root import MOST, ROOT
 from stickslip.simulation.root import compiled as root
@@ -27,7 +27,7 @@ STEADY = 0.25
 CUT = 2.0
 """Tolerances: a sub-step that is wrong by that is halved."""
 X, INVERSE, ENOUGH = (ROOT.scalars.index(name) for name in ("x", "inverse", "enough"))
-begin, begin_beyond, improve = root.begin, root.begin_beyond, root.improve
+begin, improve = root.begin, root.improve
 
 
 class Tried(NamedTuple):
@@ -136,77 +136,3 @@ def finish(plant: Plant, block: int, start: float, end: float) -> None:
     first, last = block + FIRST * SLOTS, block + LAST * SLOTS
     for i in range(SLOTS):
         plant.axis[SLOTS + i] -= plant.matrix[first + i] * start + plant.matrix[last + i] * end
-
-
-# ---- a law that jumps at rest -----------------------------------------------------------------------------------
-
-
-@kernel()
-def with_rest(plant: Plant, tried: Tried) -> float:
-    """Finish a sub-step of a law that holds at rest: it rests, leaves, slides or lands; returns as `sliding`."""
-    n, now, x = plant.machine, plant.now, plant.axis
-    base, v0, start = x[SLOTS + n.disk + 1], x[n.disk + 1], now.scale * now.friction
-    first, last = gain(plant, tried.block, 1, FIRST), gain(plant, tried.block, 1, LAST)
-    if v0 == 0.0:
-        mean = base / (first + last)
-        early = tried.speed / (gain(plant, tried.half, 1, FIRST) + gain(plant, tried.half, 1, LAST))
-        # At both ends, where the load grows evenly.
-        soon, late = 2.0 * early - mean, 3.0 * mean - 2.0 * early
-        side = 1.0 if late > 0.0 else -1.0
-        held = held_at_rest(plant, side)
-        if max(abs(mean), abs(late)) <= held:
-            rests(plant, tried, mean, mean)
-            now.rest, x[SLOTS + n.disk] = late, x[n.disk]
-            return 0.0
-        if side * soon <= held and tried.length * PARTS > 1.5 * n.sample_time:
-            return CUT
-        start = side * held
-    r = plant.search
-    free, flat = base - first * start, r[INVERSE] * STIFF < 1.0
-    stops = stopped(plant, tried, start, free, last)
-    if flat and not stops:
-        free, start, last = base, 0.0, first + last
-        stops = stopped(plant, tried, free / last, free, last)
-    if stops:
-        return 0.5 * abs(v0) * tried.length * n.stray
-    side = 1.0 if free > 0.0 else -1.0
-    held = held_at_rest(plant, side)
-    begin_beyond(r, 0.0, side * last * held - free, free - side * last * held)
-    for _ in range(MOST):
-        v = r[X]
-        torque = torque_after(plant, v if flat or v0 * v <= 0.0 else v0, v, tried.length, n.states)
-        if improve(r, v - free + last * now.scale * torque) == 0.0:
-            break
-    r[INVERSE] = min(max(r[INVERSE], 1.0 / STEEPEST), 1.0 / FLATTEST)
-    v = r[X]
-    end = (free - v) / last
-    start = end if flat else start
-    finish(plant, tried.block, start, end)
-    if v * v0 < 0.0:
-        return 0.5 * abs(v0) * tried.length * n.stray
-    return beside(plant, tried, start, end, v if flat or v0 == 0.0 else v0)
-
-
-@kernel(inline=True)
-def held_at_rest(plant: Plant, side: float) -> float:
-    """The torque that the contact withstands at rest in a direction, N·m."""
-    held = call_holding(plant.machine.holding, side, plant.contact, plant.parameters, plant.surroundings)
-    return plant.now.scale * held
-
-
-@kernel(inline=True)
-def stopped(plant: Plant, tried: Tried, start: float, free: float, last: float) -> bool:
-    """Whether the contact can take all that moves it (`free`, rad/s); the sub-step then ends at rest."""
-    if abs(free) > last * held_at_rest(plant, 1.0 if free > 0.0 else -1.0):
-        return False
-    rests(plant, tried, start, free / last)
-    return True
-
-
-@kernel(inline=True)
-def rests(plant: Plant, tried: Tried, start: float, end: float) -> None:
-    """End the sub-step at rest."""
-    n = plant.machine
-    torque_after(plant, 0.0, 0.0, tried.length, n.states)
-    finish(plant, tried.block, start, end)
-    plant.axis[SLOTS + n.disk + 1] = 0.0

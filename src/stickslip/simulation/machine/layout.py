@@ -11,6 +11,8 @@ import numpy as np
 from stickslip.jit import compiled_law, flat, kernel
 from stickslip.machines.drivetrain import INPUTS, Flow, StateSpace
 from stickslip.machines.machine import Machine
+from stickslip.simulation.machine.held_tables import NODES, WATCHED, pace_of, tables, terms_of
+from stickslip.simulation.machine.held_tables import RESOLVED as RESOLVED_EVENTS
 from stickslip.simulation.machine.movers import mover
 from stickslip.simulation.machine.plant import (
     CHANNELS,
@@ -33,7 +35,7 @@ from stickslip.simulation.machine.plant import (
 from stickslip.simulation.machine.step import measure, sample
 from stickslip.simulation.root import ROOT
 from stickslip.simulation.root import compiled as root
-from stickslip.simulation.train.layout import NO_TRAIN, halvings, lay_out_train, stand_train
+from stickslip.simulation.train.layout import NO_TRAIN, SHARE, halvings, lay_out_train, stand_train
 from stickslip.spec import Surroundings
 
 __all__ = ["CHANNELS", "Laid", "lay_out_machine", "look", "run", "stand_at", "wait"]
@@ -46,6 +48,8 @@ UNRESOLVABLE = 6
 """Halvings of a sample; a contact whose spring would need more is damped, and its sub-steps are this short."""
 BEARING_STEP = 0.1
 """omega h of the bearings' spring, which is taken explicitly."""
+WAVE = 0.3
+"""rad of the fastest ripple or cogging in a sub-step, which takes it at its middle; less at a tighter tolerance."""
 ROUNDING, LEAST = 1e-8, 0.1
 """Of a velocity above 0.1 rad/s, to which ends that enclose a jump approach."""
 TOLERANCE = 1e-7
@@ -75,14 +79,28 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE, *, located: 
     train = lay_out_train(machine, parameters, tolerance) if located else NO_TRAIN.copy()
     system = machine.linear().state_space()
     places = places_in(system, machine)
-    matrix = transition(machine, system, 0.0 if unresolved else stiff) if train.size == 1 else np.zeros(1)
+    holds = model.law.holding is not None
+    damping = viscous_part(machine) if holds else 0.0
+    if holds:
+        matrix = tables(system, places["disk"] + 1, damping, machine.sample_time)
+    elif train.size == 1:
+        matrix = transition(machine, system, 0.0 if unresolved else stiff)
+    else:
+        matrix = np.zeros(1)
     numbers, memory = np.zeros(1, MACHINE), np.zeros(1, NOW)
     n, now = numbers[0], memory[0]
     write_numbers(n, machine, places, tolerance)
     n["states"], n["stiffness"], n["unresolved"] = states, stiff, unresolved
     n["located"] = train.size > 1
-    n["mover"], n["step"], n["holding"] = mover(bool(n["located"])), pointers.step, pointers.holding
+    n["mover"], n["step"], n["holding"] = mover(bool(n["located"]), holds), pointers.step, pointers.holding
     n["resolving"] = min(resolving, UNRESOLVABLE)
+    if holds:
+        n["damping"] = damping
+        n["weight"] /= SHARE
+        fastest = pace_of(system, places["disk"] + 1) * machine.sample_time
+        n["resolving"] = min(halvings(fastest / RESOLVED_EVENTS), FINEST)
+        n["watched"] = min(halvings(fastest / (WATCHED * NODES)), int(n["resolving"]))
+        n["terms"] = terms_of(2.0 * fastest / float(1 << int(n["resolving"])))
     if unresolved:
         n["coarsest"] = UNRESOLVABLE
     now["warmth"], now["scale"] = machine.contact.heat.ambient, 1.0
@@ -121,6 +139,16 @@ def places_in(system: StateSpace, machine: Machine) -> dict[str, int]:
     }  # fmt: skip
 
 
+def viscous_part(machine: Machine) -> float:
+    """Slope of the contact's torque over the velocity where it slides fast, N·m s/rad, of both directions the mean."""
+    model, total = machine.clutch, 0.0
+    z = model.law.state(model.parameters)
+    for side in (1.0, -1.0):
+        slow, fast = (model.law.step(v, v, 0.0, z, model.parameters, Surroundings()) for v in (side, 2.0 * side))
+        total += 0.5 * side * (fast - slow)
+    return max(total, 0.0) if math.isfinite(total) else 0.0
+
+
 def transition(machine: Machine, system: StateSpace, stiff: float) -> Array:
     """The exact flow of the linear part over every length of a sub-step, with every part of the contact's stiffness
     (N·m/rad): what it makes of the states, and what each input adds."""
@@ -157,9 +185,11 @@ def write_numbers(n: Any, machine: Machine, places: dict[str, int], tolerance: f
     """Fill in a machine's `MACHINE`, but for what its contact's stiffness decides."""
     amplifier, encoder, sensor = machine.amplifier, machine.encoder, machine.sensor
     contact, heat, bearings = machine.contact, machine.contact.heat, machine.contact.bearings
+    # What is taken in the middle of a sub-step is wrong by the square of its length.
+    finer = max(math.sqrt(TOLERANCE / tolerance), 1.0)
     values = {
         **places, "ripples": len(contact.ripple.order), "cogs": len(machine.cogging.order),
-        "coarsest": halvings(bearing_parts(machine)), "seed": machine.seed,
+        "coarsest": min(halvings(bearing_parts(machine, finer)), FINEST), "seed": machine.seed,
         "delay": math.floor(math.ldexp(machine.delay, FINEST) + 0.5), "sample_time": machine.sample_time,
         "torque_constant": amplifier.torque_constant, "current_limit": min(amplifier.current_limit, 1e300),
         "command_step": amplifier.command.step, "monitor_step": amplifier.monitor.step,
@@ -171,8 +201,9 @@ def write_numbers(n: Any, machine: Machine, places: dict[str, int], tolerance: f
         "heat_reference": heat.reference, "ambient": heat.ambient, "heating": heat.resistance,
         "heat_kept": math.exp(-machine.sample_time / heat.time), "heat_time": heat.time,
         "bearing": bearings.coulomb, "bearing_stiffness": bearings.stiffness, "viscous": bearings.viscous,
-        "weight": 2.0 / 3.0 * machine.sample_time / (disk_of(machine) * tolerance), "stray": 1.0 / tolerance,
+        "weight": 2.0 / 3.0 * machine.sample_time / (disk_of(machine) * tolerance),
         "order": max((abs(o) for o in (*contact.ripple.order, *machine.cogging.order)), default=0.0),
+        "wave": WAVE / finer,
     }  # fmt: skip
     for name, value in values.items():
         n[name] = value
@@ -188,13 +219,13 @@ def waves_of(machine: Machine) -> Array:
     return flat(np.array(rows, dtype=np.float64).ravel())
 
 
-def bearing_parts(machine: Machine) -> float:
-    """Parts of a sample that resolve the bearings' spring."""
+def bearing_parts(machine: Machine, finer: float) -> float:
+    """Parts of a sample that resolve the bearings' spring, so many times finer than at the usual tolerance."""
     bearings = machine.contact.bearings
     if bearings.coulomb == 0.0:
         return 1.0
     shaft = machine.flexible.shaft if machine.flexible else machine.inertia
-    return machine.sample_time * math.sqrt(bearings.stiffness / shaft) / BEARING_STEP
+    return machine.sample_time * math.sqrt(bearings.stiffness / shaft) * finer / BEARING_STEP
 
 
 # ---- runs ---------------------------------------------------------------------------------------------------

@@ -39,6 +39,11 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 REASONS = {
     TRIPPED: "the drive switched off: faster than its encoder follows, or no longer a number",
 }
+FINER = 0.01
+"""Of the tolerance, or of the usual one, in the run that one is held against: what is taken in the middle of a sub-step
+grows no coarser with a looser tolerance."""
+LEAST = 0.01
+"""Of the tolerance: what two runs that agree may still have in common."""
 ON_TIME = 1e-6
 """Samples by which output times may lie beside a sample."""
 
@@ -63,8 +68,9 @@ def simulate_machine(
     output : float or array
         Spacing of the record's rows, s, a whole number of samples; or times of samples.
     check : bool
-        Whether the run is repeated at a hundredth of the tolerance (the noise is the same): ``meta["accuracy"]`` then
-        says by how much both differ at most, ``error_rad``.
+        Whether the run is repeated at a hundredth of the tolerance, at most of the usual one (the noise is the same):
+        ``meta["accuracy"]`` then says by how much both differ at most, ``error_rad``, a hundredth of the tolerance at
+        least.
     tolerance : float
         Error in position that a sub-step may make by the end of its sample, rad; a located flow's step a tenth of it.
 
@@ -84,7 +90,7 @@ def simulate_machine(
     runs = [_run(own, control, reference, duration, places, initial, tolerance, metered)]
     substeps = int(runs[0].laid.now["taken"])
     if check and runs[0].code == 0:
-        runs.append(_run(own, control, reference, duration, places, initial, 0.01 * tolerance, False))
+        runs.append(_run(own, control, reference, duration, places, initial, FINER * min(tolerance, TOLERANCE), False))
     meta: dict[str, Any] = {
         "what": "simulation", "version": stickslip.__version__, "integrator": "machine", "slip_rule": slip_rule,
         "slip_rules": slip_rules(friction=own.contact.friction, **told.pop("laws")),
@@ -96,7 +102,7 @@ def simulate_machine(
         meta["general_step"] = cannot_locate(own)
     if learned := after(controller, runs[0].state, machine.sample_time):
         meta["learned"] = learned
-    meta |= _results(runs, metered)
+    meta |= _results(runs, tolerance, metered)
     columns = np.ascontiguousarray(runs[0].rows.T)
     channels = {name: columns[i] for i, name in enumerate(COLUMNS) if name != "time"}
     record = Record(columns[0], channels, UNITS, meta)
@@ -107,12 +113,13 @@ def simulate_machine(
     return record
 
 
-def _results(runs: list[_Ran], metered: bool) -> dict[str, Any]:
+def _results(runs: list[_Ran], tolerance: float, metered: bool) -> dict[str, Any]:
     """How far two runs lie apart, where there are two, and the metrics of the first."""
     out: dict[str, Any] = {}
     if len(runs) == 2:
         apart = np.abs(runs[0].rows[:, 3] - runs[1].rows[:, 3])
-        out["accuracy"] = {"error_rad": float(np.max(apart, initial=0.0))}
+        least = LEAST * float(tolerance)
+        out["accuracy"] = {"error_rad": max(float(np.max(apart, initial=0.0)), least)}
     if metered and runs[0].code == 0:
         turns = turning_points(runs[0].meter, runs[0].turns)
         out["metrics"] = {k: float(v) for k, v in metrics(runs[0].meter, turns).items()}

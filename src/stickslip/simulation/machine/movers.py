@@ -1,4 +1,4 @@
-"""The two ways a machine crosses a sample, each compiled where a machine first takes it.
+"""The three ways a machine crosses a sample, each compiled where a machine first takes it.
 
 `stickslip.simulation.machine.step` calls them by address. Compiled into it, every machine would wait for both.
 """
@@ -9,6 +9,7 @@ import math
 from typing import Any
 
 from stickslip.jit import compiled_mover, kernel
+from stickslip.simulation.machine.holding import cross as cross_events
 from stickslip.simulation.machine.plant import FINEST, Plant, plant_at
 from stickslip.simulation.machine.substep import cross
 from stickslip.simulation.sampled.modes import friction
@@ -16,12 +17,13 @@ from stickslip.simulation.train.cross import advance
 from stickslip.simulation.train.records import train_of
 
 
-def mover(located: bool) -> int:
-    """The address of a machine's way across a sample: the located flow of its train, or sub-steps.
+def mover(located: bool, holds: bool) -> int:
+    """The address of a machine's way across a sample: the located flow of its train, steps between the events of a contact
+    that holds at rest, or sub-steps.
 
-    Both take the addresses of a `Plant`, then what `substep.cross` takes, whose value they return.
+    All take the addresses of a `Plant`, then what `substep.cross` takes, whose value they return.
     """
-    return compiled_mover(flows if located else steps)
+    return compiled_mover(flows if located else events if holds else steps)
 
 
 def flows(
@@ -32,6 +34,15 @@ def flows(
     plant = plant_at(machine, now, waves, matrix, search, axis, contact, parameters, surroundings, train)
     locate(plant, before, drive, int(late))
     return 0.0
+
+
+def events(
+    machine: Any, now: Any, waves: Any, matrix: Any, search: Any, axis: Any, contact: Any, parameters: Any,
+    surroundings: Any, train: Any, before: float, drive: float, late: float, factor: float,
+) -> float:  # fmt: skip
+    """By steps that end where the contact breaks away or comes to rest."""
+    plant = plant_at(machine, now, waves, matrix, search, axis, contact, parameters, surroundings, train)
+    return cross_events(plant, before, drive, int(late), factor)
 
 
 def steps(

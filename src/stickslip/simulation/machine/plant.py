@@ -33,6 +33,8 @@ MACHINE = np.dtype(
             "rotor", "shaft", "disk", "lag", "mode",
             # Halvings of the sample that a sub-step needs at least, and needs where the contact's spring acts.
             "coarsest", "resolving", "unresolved",
+            # The same from which what a step shows tells whether there is an event; terms of a series.
+            "watched", "terms",
             # In shortest sub-steps.
             "delay", "seed",
             # Whether the motion is the located flow of its train; addresses of what moves it over a sample, and of the
@@ -44,8 +46,11 @@ MACHINE = np.dtype(
             "monitor_noise", "count", "encoder_noise", "mode_share", "max_speed", "sensor_step", "sensor_noise",
             "drift", "drift_time", "drift_begin", "heat_coefficient", "heat_reference", "ambient", "heating",
             "heat_kept", "heat_time", "bearing", "bearing_stiffness", "viscous",
-            # N·m/rad of the contact; tolerances a N·m s and a rad are; the highest order of ripple and cogging.
-            "stiffness", "weight", "stray", "order",
+            # N·m/rad of the contact; tolerances a N·m s is; the highest order of ripple and cogging, and
+            # rad of it in a sub-step.
+            "stiffness", "weight", "order", "wave",
+            # N·m s/rad of a contact that holds at rest, which belong to the linear part while it slides.
+            "damping",
         )),
     ]
 )  # fmt: skip
@@ -89,7 +94,8 @@ class Laid(NamedTuple):
     waves : array, shape (3 n,)
         Order, amplitude and phase of every harmonic: those of the contact's ripple, then of the cogging.
     matrix : array
-        By part of the contact's stiffness and length of the sub-step: `COLUMNS` columns of `SLOTS` numbers.
+        By part of the contact's stiffness and length of the sub-step: `COLUMNS` columns of `SLOTS` numbers; of a contact
+        that holds at rest what `stickslip.simulation.machine.held_tables` writes.
     search : array
         What the root finder keeps (`stickslip.simulation.root.ROOT`).
     axis : array, shape (2 SLOTS,)

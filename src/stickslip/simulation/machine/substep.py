@@ -20,7 +20,7 @@ import math
 from typing import Any
 
 from stickslip.jit import columns_times, kernel, pointer
-from stickslip.simulation.machine.contact import ENOUGH, PARTS, Tried, sliding, with_rest
+from stickslip.simulation.machine.contact import ENOUGH, PARTS, Tried, sliding
 from stickslip.simulation.machine.plant import (
     BLOCK,
     FINEST,
@@ -39,8 +39,6 @@ UNBALANCE = 1e-6
 """Of a velocity, over a whole sample, by which a solved sub-step may be out of balance; the torque takes it up."""
 GROWS = 0.125
 """Of the tolerance, below which the next sub-step is twice as long."""
-WAVE = 0.3
-"""rad of the fastest ripple or cogging in a sub-step, which takes it at its middle."""
 SLIDES = 0.999
 """Of the bearings' Coulomb torque, from which they have no spring to resolve."""
 NEAR = 0.02
@@ -86,7 +84,7 @@ def least_level(plant: Plant) -> int:
     if now.spring > 0:
         level = max(level, n.resolving)
     way = n.order * abs(x[n.disk + 1]) * n.sample_time
-    while way > WAVE and level < FINEST:
+    while way > n.wave and level < FINEST:
         way *= 0.5
         level += 1
     return level
@@ -136,8 +134,23 @@ def attempt(plant: Plant, drive: float, factor: float, spring: int, level: int) 
     x = plant.axis
     h = n.sample_time / float(1 << level)
     plant.search[ENOUGH] = UNBALANCE / float(1 << level)
+    x[n.size + IN_MOTOR], x[n.size + IN_ANGLE] = drive, x[n.disk]
+    act(plant, factor, h)
+    block = (spring * LEVELS + level) * BLOCK
+    columns_times(pointer(plant.matrix, block), x, n.size + GIVEN, pointer(x, SLOTS))
+    half = block + BLOCK
+    middle, speed = 0.0, 0.0
+    if n.unresolved == 0:
+        middle, speed = disk_after(plant, half + n.disk)
+    return sliding(plant, Tried(block, half, middle, speed, h, spring), now.scale * now.friction)
+
+
+@kernel(inline=True)
+def act(plant: Plant, factor: float, h: float) -> None:
+    """Write down ripple, cogging and the bearings' torque in the middle of a sub-step of h s."""
+    n, now, x = plant.machine, plant.now, plant.axis
     given = n.size  # behind the states
-    x[given + IN_MOTOR], x[given + IN_ANGLE], now.scale = drive, x[n.disk], factor
+    now.scale = factor
     if n.ripples > 0:
         angle = x[n.disk] + 0.5 * h * x[n.disk + 1]
         now.scale = factor * (1.0 + near(plant.waves, n.order, now.ripple, 0, n.ripples, angle))
@@ -146,16 +159,6 @@ def attempt(plant: Plant, drive: float, factor: float, spring: int, level: int) 
         x[given + IN_COG] = near(plant.waves, n.order, now.cogging, n.ripples, n.cogs, angle)
     if n.bearing > 0.0:
         x[given + IN_BEARING] = -rolled(n, now.bearing, 0.5 * h * x[n.shaft + 1])
-    block = (spring * LEVELS + level) * BLOCK
-    columns_times(pointer(plant.matrix, block), x, n.size + GIVEN, pointer(x, SLOTS))
-    half = block + BLOCK
-    middle, speed = 0.0, 0.0
-    if n.unresolved == 0:
-        middle, speed = disk_after(plant, half + n.disk)
-    tried = Tried(block, half, middle, speed, h, spring)
-    if n.holding != 0:
-        return with_rest(plant, tried)
-    return sliding(plant, tried, now.scale * now.friction)
 
 
 @kernel(inline=True)
