@@ -46,6 +46,9 @@ RESOLVED = 1.5
 """omega h of the contact's spring that a sub-step takes at most where the spring, or a part of it, sticks."""
 UNRESOLVABLE = 6
 """Halvings of a sample; a contact whose spring would need more is damped, and its sub-steps are this short."""
+UNBALANCE, LEAST_UNBALANCE = 1e-6, 1e-6
+"""Of a velocity, over a whole sample, by which a solved sub-step may be out of balance at the usual tolerance; part of
+that at the tightest."""
 BEARING_STEP = 0.1
 """omega h of the bearings' spring, which is taken explicitly."""
 WAVE = 0.3
@@ -203,7 +206,7 @@ def write_numbers(n: Any, machine: Machine, places: dict[str, int], tolerance: f
         "bearing": bearings.coulomb, "bearing_stiffness": bearings.stiffness, "viscous": bearings.viscous,
         "weight": 2.0 / 3.0 * machine.sample_time / (disk_of(machine) * tolerance),
         "order": max((abs(o) for o in (*contact.ripple.order, *machine.cogging.order)), default=0.0),
-        "wave": WAVE / finer,
+        "wave": WAVE / finer, "unbalance": UNBALANCE * min(max(tolerance / TOLERANCE, LEAST_UNBALANCE), 1.0),
     }  # fmt: skip
     for name, value in values.items():
         n[name] = value

@@ -39,9 +39,11 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 REASONS = {
     TRIPPED: "the drive switched off: faster than its encoder follows, or no longer a number",
 }
-FINER = 0.01
+FINER = 0.001
 """Of the tolerance, or of the usual one, in the run that one is held against: what is taken in the middle of a sub-step
 grows no coarser with a looser tolerance."""
+SURE = 1.5
+"""Of what two runs lie apart: the finer one has an error too, a tenth to a third of the other's."""
 LEAST = 0.01
 """Of the tolerance: what two runs that agree may still have in common."""
 ON_TIME = 1e-6
@@ -68,7 +70,7 @@ def simulate_machine(
     output : float or array
         Spacing of the record's rows, s, a whole number of samples; or times of samples.
     check : bool
-        Whether the run is repeated at a hundredth of the tolerance, at most of the usual one (the noise is the same):
+        Whether the run is repeated at a thousandth of the tolerance, at most of the usual one (the noise is the same):
         ``meta["accuracy"]`` then says by how much both differ at most, ``error_rad``, a hundredth of the tolerance at
         least.
     tolerance : float
@@ -119,7 +121,7 @@ def _results(runs: list[_Ran], tolerance: float, metered: bool) -> dict[str, Any
     if len(runs) == 2:
         apart = np.abs(runs[0].rows[:, 3] - runs[1].rows[:, 3])
         least = LEAST * float(tolerance)
-        out["accuracy"] = {"error_rad": max(float(np.max(apart, initial=0.0)), least)}
+        out["accuracy"] = {"error_rad": max(SURE * float(np.max(apart, initial=0.0)), least)}
     if metered and runs[0].code == 0:
         turns = turning_points(runs[0].meter, runs[0].turns)
         out["metrics"] = {k: float(v) for k, v in metrics(runs[0].meter, turns).items()}

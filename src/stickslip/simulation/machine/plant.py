@@ -47,8 +47,9 @@ MACHINE = np.dtype(
             "drift", "drift_time", "drift_begin", "heat_coefficient", "heat_reference", "ambient", "heating",
             "heat_kept", "heat_time", "bearing", "bearing_stiffness", "viscous",
             # N·m/rad of the contact; tolerances a N·m s is; the highest order of ripple and cogging, and
-            # rad of it in a sub-step.
-            "stiffness", "weight", "order", "wave",
+            # rad of it in a sub-step; of a velocity, over a whole sample, by which a solved sub-step may be out of
+            # balance, which the torque takes up.
+            "stiffness", "weight", "order", "wave", "unbalance",
             # N·m s/rad of a contact that holds at rest, which belong to the linear part while it slides.
             "damping",
         )),

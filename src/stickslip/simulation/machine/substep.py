@@ -35,8 +35,6 @@ from stickslip.simulation.machine.plant import (
     Plant,
 )
 
-UNBALANCE = 1e-6
-"""Of a velocity, over a whole sample, by which a solved sub-step may be out of balance; the torque takes it up."""
 GROWS = 0.125
 """Of the tolerance, below which the next sub-step is twice as long."""
 SLIDES = 0.999
@@ -133,7 +131,7 @@ def attempt(plant: Plant, drive: float, factor: float, spring: int, level: int) 
     n, now = plant.machine, plant.now
     x = plant.axis
     h = n.sample_time / float(1 << level)
-    plant.search[ENOUGH] = UNBALANCE / float(1 << level)
+    plant.search[ENOUGH] = n.unbalance / float(1 << level)
     x[n.size + IN_MOTOR], x[n.size + IN_ANGLE] = drive, x[n.disk]
     act(plant, factor, h)
     block = (spring * LEVELS + level) * BLOCK
