@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.references import BEFORE
 from stickslip.spec import Par, ReferenceKind
 
 
@@ -21,7 +22,7 @@ class Params(NamedTuple):
 def profile(t: float, p: Any, out: Any) -> None:
     """Write position, velocity and acceleration at time t."""
     out.acceleration = 0.0
-    if t < p.end:
+    if t < p.end * BEFORE:
         out.position = p.velocity * t
         out.velocity = p.velocity
     else:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.references import BEFORE
 from stickslip.spec import Par, ReferenceKind
 
 
@@ -25,7 +26,7 @@ def profile(t: float, p: Any, out: Any) -> None:
     out.position = 0.0
     out.velocity = 0.0
     out.acceleration = 0.0
-    begun = math.floor(t / p.dwell) + 1.0
+    begun = math.floor(t / p.dwell / BEFORE) + 1.0
     if begun > p.steps:
         begun = p.steps
     for i in range(int(begun)):

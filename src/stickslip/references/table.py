@@ -7,6 +7,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from stickslip.references import BEFORE
 from stickslip.spec import Par, ReferenceKind
 
 
@@ -27,7 +28,7 @@ def profile(t: float, p: Any, out: Any) -> None:
         out.position = p.position[0]
         if t == p.time[0]:
             out.velocity = p.velocity[0]
-    elif t >= p.time[last]:
+    elif t >= p.time[last] * BEFORE:
         out.position = p.position[last]
     else:
         low = 0

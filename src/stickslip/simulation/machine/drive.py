@@ -165,10 +165,10 @@ def now(plant: Plant, shown: Any, out: Any) -> None:
 
 @kernel()
 def act(asked: Asked, shown: Any, time: float) -> float:
-    """What the controller commands at a sample, N·m; the motion is the reference there."""
+    """What the controller commands at a sample, N·m; the motion is the reference there, as
+    `Reference.sample` gives it: at a jump what comes behind."""
     motion = asked.motion
-    call_profile(asked.profile, time + NUDGE, asked.reference, pointer(motion, 0))
-    motion.position -= NUDGE * motion.velocity
+    call_profile(asked.profile, time, asked.reference, pointer(motion, 0))
     asked.around.temperature, asked.around.time = shown.temperature, time
     torque = call_sample(
         asked.control, shown.position, motion.position, motion.velocity, motion.acceleration, asked.settings,

@@ -102,13 +102,16 @@ def tables(system: StateSpace, turning: int, damping: float, sample_time: float)
     pull[:size] = system.a[turning] / load[turning]
     for place, source in OF_STATES:
         pull[size + place] = system.b[turning, INPUTS.index(source)] / load[turning]
-    flows, watch = out[:PIECE].reshape(2, LEVELS, COLUMNS, SLOTS), out[WATCH:PULL].reshape(2, FINEST + 1, COLUMNS, SLOTS)
+    flows, watch = (
+        out[:PIECE].reshape(2, LEVELS, COLUMNS, SLOTS),
+        out[WATCH:PULL].reshape(2, FINEST + 1, COLUMNS, SLOTS),
+    )
     rates = out[RATES:PUSHED].reshape(2, SLOTS, SLOTS)
     sliding = replace(system, a=system.a.copy())
     sliding.a[:, turning] -= damping * load
     for kind, own in ((FREE, sliding), (HELD, held_system(system, turning))):
         generator = generator_of(own)
-        rates[kind, : size + GIVEN] = generator[: SLOTS, : size + GIVEN].T
+        rates[kind, : size + GIVEN] = generator[:SLOTS, : size + GIVEN].T
         seen = np.zeros(len(generator))
         if kind == FREE:
             seen[turning] = 1.0

@@ -18,7 +18,17 @@ from stickslip.jit import call_holding, call_step, columns_times, kernel, pointe
 from stickslip.simulation.case_arrays import AROUND
 from stickslip.simulation.machine.contact import FLATTEST, STEEPEST, STIFF, finish, gain
 from stickslip.simulation.machine.held_tables import FREE, HELD, NODES, PIECE, PULL, SHOWN, WATCH
-from stickslip.simulation.machine.plant import BLOCK, FINEST, FIRST, GIVEN, IN_MOTOR, LAST, LEVELS, SLOTS, Plant
+from stickslip.simulation.machine.plant import (
+    BLOCK,
+    FINEST,
+    FIRST,
+    GIVEN,
+    IN_MOTOR,
+    LAST,
+    LEVELS,
+    SLOTS,
+    Plant,
+)
 from stickslip.simulation.machine.series import (
     curve_at,
     expanded,
@@ -42,10 +52,8 @@ SLIVER = 0.2
 """Of a step: less than that up to its place on the sample is taken together with it."""
 SNAP = 1e-13
 """Of a sample: a step that ends so near to its half, quarter, ... ends there."""
-STORM = 2000
+STORM = 10000
 """Steps in a sample, after which the motion is no number."""
-UNBALANCE = 1e-9
-"""Of a velocity, over a whole sample, by which a solved step may be out of balance; the torque takes it up."""
 BARELY = 1e-30
 """rad/s, at which the law says what it takes when the contact has just begun to slide."""
 CLOSER, STILL = math.inf, -1.0
@@ -267,9 +275,7 @@ def extreme(plant: Plant, side: float, before: float, limit: float) -> tuple[int
 
 
 @kernel()
-def slides(
-    plant: Plant, side: float, level: int, h: float, block: int, kept: bool
-) -> tuple[float, float]:
+def slides(plant: Plant, side: float, level: int, h: float, block: int, kept: bool) -> tuple[float, float]:
     """A step in which the disk slides, or at whose end it comes to rest."""
     n, now, x = plant.machine, plant.now, plant.axis
     v0 = x[n.disk + 1]
@@ -337,7 +343,7 @@ def solved(plant: Plant, side: float, h: float, block: int, start: float, flat: 
     if flat:
         first, last = 0.0, first + last
     free -= first * start
-    r[ENOUGH] = UNBALANCE
+    r[ENOUGH] = n.unbalance
     begin(r, free - last * start)
     for _ in range(MOST):
         v = r[X]

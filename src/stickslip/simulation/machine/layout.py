@@ -46,9 +46,13 @@ RESOLVED = 1.5
 """omega h of the contact's spring that a sub-step takes at most where the spring, or a part of it, sticks."""
 UNRESOLVABLE = 6
 """Halvings of a sample; a contact whose spring would need more is damped, and its sub-steps are this short."""
-UNBALANCE, LEAST_UNBALANCE = 1e-6, 1e-6
+UNBALANCE, LEAST_UNBALANCE = 1e-6, 1e-5
 """Of a velocity, over a whole sample, by which a solved sub-step may be out of balance at the usual tolerance; part of
 that at the tightest."""
+HELD_UNBALANCE = 1e-3
+"""Times that, of a contact that holds at rest, whose law costs little."""
+TIGHTEST = 1e-13
+"""rad: such a contact's steps are held to no tighter a tolerance, of which rounding would leave nothing."""
 BEARING_STEP = 0.1
 """omega h of the bearings' spring, which is taken explicitly."""
 WAVE = 0.3
@@ -99,7 +103,8 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE, *, located: 
     n["resolving"] = min(resolving, UNRESOLVABLE)
     if holds:
         n["damping"] = damping
-        n["weight"] /= SHARE
+        n["weight"] *= min(tolerance / TIGHTEST, 1.0) / SHARE
+        n["unbalance"] *= HELD_UNBALANCE
         fastest = pace_of(system, places["disk"] + 1) * machine.sample_time
         n["resolving"] = min(halvings(fastest / RESOLVED_EVENTS), FINEST)
         n["watched"] = min(halvings(fastest / (WATCHED * NODES)), int(n["resolving"]))
@@ -147,7 +152,9 @@ def viscous_part(machine: Machine) -> float:
     model, total = machine.clutch, 0.0
     z = model.law.state(model.parameters)
     for side in (1.0, -1.0):
-        slow, fast = (model.law.step(v, v, 0.0, z, model.parameters, Surroundings()) for v in (side, 2.0 * side))
+        slow, fast = (
+            model.law.step(v, v, 0.0, z, model.parameters, Surroundings()) for v in (side, 2.0 * side)
+        )
         total += 0.5 * side * (fast - slow)
     return max(total, 0.0) if math.isfinite(total) else 0.0
 

@@ -92,7 +92,9 @@ def simulate_machine(
     runs = [_run(own, control, reference, duration, places, initial, tolerance, metered)]
     substeps = int(runs[0].laid.now["taken"])
     if check and runs[0].code == 0:
-        runs.append(_run(own, control, reference, duration, places, initial, FINER * min(tolerance, TOLERANCE), False))
+        runs.append(
+            _run(own, control, reference, duration, places, initial, FINER * min(tolerance, TOLERANCE), False)
+        )
     meta: dict[str, Any] = {
         "what": "simulation", "version": stickslip.__version__, "integrator": "machine", "slip_rule": slip_rule,
         "slip_rules": slip_rules(friction=own.contact.friction, **told.pop("laws")),

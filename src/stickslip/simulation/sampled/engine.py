@@ -59,8 +59,6 @@ from stickslip.simulation.sampled.slip import slip
 from stickslip.simulation.sampled.stick import stick
 from stickslip.waiting import Reached, watched
 
-NUDGE = 1e-11
-"""s after a sample, at which the reference is read, so that a kink there is seen from behind."""
 MOST_STEPS = 5e7
 
 
@@ -270,10 +268,10 @@ def advance(axis: Any, z: Any, held: Held, plant: Plant, t: float, left: float) 
 
 @kernel(exact=False, inline=True)
 def act(control: Acting, axis: Any, z: Any, held: Held, plant: Plant, t: float) -> None:
-    """Let the controller sample, and hold what it answers; ``control.motion`` is the reference then."""
+    """Let the controller sample, and hold what it answers; ``control.motion`` is the reference then, as
+    `Reference.sample` gives it: at a jump what comes behind."""
     motion = control.motion
-    call_profile(control.profile, t + NUDGE, control.reference_parameters, motion)
-    motion[0] -= NUDGE * motion[1]
+    call_profile(control.profile, t, control.reference_parameters, motion)
     control.surroundings[0], control.surroundings[3] = z.position + z.moved, t
     z.torque = call_sample(
         control.controller, measured_position(z.position + z.moved, control.encoder),
