@@ -19,7 +19,8 @@ from stickslip.control.controller import Controller
 from stickslip.model import Model
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.many import batch, simd_batch
-from stickslip.sweep.block import SURE_OF_STEPS, differ
+from stickslip.sweep.block import SURE_OF_STEPS
+from stickslip.sweep.metric_check import differ
 
 METRICS = ("position_rms_rad", "position_peak_rad", "velocity_rms_rad_s", "torque_rms_Nm")
 STRIBECK = Model("stribeck", k=3.5e4, **closed_loop.CURVE)

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip.study.study import load as load_study
-from stickslip.sweep import block
+from stickslip.sweep import block, measured, metric_check
 from stickslip.sweep.plan import Sweep, load
 
 EXACT = 3.3e-11
@@ -59,14 +59,14 @@ def main() -> None:
         sweep = sweep_of(reference, options.cases, options.seed)
         for i, run in enumerate(sweep.runs):
             start = time.process_time()
-            blocks = [block.compute(sweep, i, at) for at in range(0, options.cases, block.BLOCK)]
+            blocks = [block.compute(sweep, i, at) for at in range(0, options.cases, sweep.size_of(i))]
             spent = time.process_time() - start
             found = np.concatenate([b.metrics for b in blocks])
             flagged = np.concatenate([b.flagged for b in blocks])
             values = sweep.values(run, sweep.drawn.block(0, options.cases))
             exact = replace(run, numerics=replace(run.numerics, tolerance=EXACT))
-            sure = block.measured(exact, values, sweep.metrics, options.cases)
-            off = block.differ(found, sure.metrics, sweep.metrics, run.duration, WANTED)
+            sure = measured.measured(exact, values, sweep.metrics, options.cases)
+            off = metric_check.differ(found, sure.metrics, sweep.metrics, run.duration, WANTED)
             well = run.controller not in NOT_W[reference]
             share, missed = float(flagged.mean()), int(np.sum(off & ~flagged))
             fine = missed == 0 and (share <= MOST_FLAGGED or not well)

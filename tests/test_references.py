@@ -6,6 +6,7 @@ import ctypes
 import math
 from itertools import pairwise
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 import pandas
@@ -114,6 +115,23 @@ def test_scurve_keeps_its_limits_and_arrives(distance, velocity, acceleration, j
 def test_table_passes_through_its_points():
     t, x = [0.0, 0.5, 1.5, 2.0], [0.0, 1.0, -1.0, 0.25]
     assert Reference.table(t, x).sample(t)[:, 0] == pytest.approx(x)
+
+
+def test_a_table_breaks_at_its_points_and_where_it_turns():
+    """Beside the points: where a cubic's velocity passes through zero, twice, once at a bend, or never."""
+    t, x, v = [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.0, 0.0, 1.0, 1.0], [1.0, 1.0, -1.0, 1.0, 0.0]
+    found = Reference.table(t, x, v).breaks(4.0)
+    third = 0.5 - np.sqrt(1.0 / 12.0)
+    turns = [third, 1.0 - third, 1.5, 2.0 + (4.0 - np.sqrt(10.0)) / 6.0, 3.0 + 1.0 / 3.0]
+    assert found == pytest.approx(sorted([1.0, 2.0, 3.0, *turns]))
+
+
+def test_a_table_of_many_points_is_laid_out_at_once():
+    time = np.linspace(0.0, 20.0, 2001)
+    reference = Reference.table(time, np.sin(time))
+    begun = perf_counter()
+    assert len(reference.breaks(20.0)) >= 1999
+    assert perf_counter() - begun < 0.05  # it was 0.2 s, for every case of a sweep
 
 
 def test_table_without_velocities_does_not_overshoot():

@@ -42,6 +42,19 @@ def test_what_was_found_is_not_counted_for_the_time_left(monkeypatch: pytest.Mon
     assert "900/1200 [00:00<?, ?run/s]" in shown.getvalue()
 
 
+def test_a_pipe_gets_a_line_now_and_then(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter([0.0, 1.0, 25.0, 30.0, 50.0])
+    monkeypatch.setattr(_output.time, "monotonic", lambda: next(clock))
+    with _output.progress_bar("it") as progress:
+        for finished in (100, 200, 210, 300):
+            progress(finished, 1000)
+    assert capsys.readouterr().err == (
+        "stickslip: it: 200 of 1000 done, about 3 min left\nstickslip: it: 300 of 1000 done, about 3 min left\n"
+    )
+
+
 def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,7 +11,7 @@ from stickslip.analyse.controller_loop import linearised
 from stickslip.errors import Divergence, InputError, LawError
 from stickslip.study.build import Numerics
 from stickslip.study.planned_run import PlannedRun
-from stickslip.sweep.block import measured
+from stickslip.sweep.measured import measured
 
 HEAD = '''"""A law of one's own."""
 import math

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +13,11 @@ from stickslip.cli import main
 from stickslip.errors import ConfigError
 from stickslip.machines.files import machine
 from stickslip.machines.machine import IMPERFECTIONS
+from stickslip.simulation.machine.loop import simulate_machine
 from stickslip.study import study as studies
 from stickslip.study.plan import load, load_run
-from stickslip.sweep.block import measured
+from stickslip.sweep.measured import measured
+from stickslip.sweep.metric_check import checked
 from stickslip.sweep.numbers import known, varied
 
 STUDY = """
@@ -150,6 +153,22 @@ def test_a_sweep_varies_any_number_of_a_machine(run: Path) -> None:
     assert len(set(found.metrics[:, 0].tolist())) == 3
     alone = ss.simulate(planned.axis, planned.control, planned.motion, planned.duration)
     assert found.metrics[0, 0] == alone.meta["metrics"]["position_rms_rad"]
+
+
+def test_a_swept_machine_is_checked_by_one_finer_run(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran: list[float] = []
+
+    def counted(*given: Any, tolerance: float, **more: Any) -> ss.Record:
+        ran.append(tolerance)
+        return simulate_machine(*given, tolerance=tolerance, **more)
+
+    monkeypatch.setattr("stickslip.sweep.measured.simulate_machine", counted)
+    planned, metrics = load_run(run), ["position_rms_rad"]
+    values = {"machine.encoder.counts": np.array([known(planned)["machine.encoder.counts"]])}
+    found = measured(planned, values, metrics, 1)
+    sure, _ = checked(planned, values, metrics, found)
+    assert ran == pytest.approx([1e-7, 1e-9])  # as simulate(check=True) does
+    assert sure.metrics[0, 0] == found.metrics[0, 0]
 
 
 def test_a_sweep_of_a_machine_from_its_file(study: Path) -> None:

@@ -14,17 +14,19 @@ import pyarrow.dataset
 import pyarrow.parquet
 import pytest
 
+import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError, UnknownName
 from stickslip.simulation.adaptive import engine as adaptive
-from stickslip.sweep import block, dataset, execute, numbers, summary
+from stickslip.simulation.sampled import engine as sampled
+from stickslip.sweep import block, dataset, execute, forecast, measured, metric_check, numbers, summary
 from stickslip.sweep.plan import load
 from support.sweeps import SMALL, table
 
 
 @pytest.fixture(scope="module")
 def small():
-    return load(SMALL)
+    return replace(load(SMALL), sizes=(256, 256))
 
 
 @pytest.fixture(scope="module")
@@ -63,8 +65,8 @@ def test_numbers_of_a_run_are_read_and_varied(small):
 def test_a_batch_gives_what_the_loops_give_alone(small, name):
     run = small.runs[1]
     values = {name: numbers.value_of(run, name) * np.array([0.9, 1.1])}
-    together = block.measured(run, values, small.metrics, 2).metrics
-    alone = [block._alone(run, {name: float(v)}, small.metrics)[0] for v in values[name]]
+    together = measured.measured(run, values, small.metrics, 2).metrics
+    alone = [measured._alone(run, {name: float(v)}, small.metrics)[0] for v in values[name]]
     assert together == pytest.approx(np.array(alone), rel=2e-4)
     assert together[0] != pytest.approx(together[1], rel=1e-6)
 
@@ -75,15 +77,15 @@ def test_only_the_exact_integrator_is_made_wrong_in_two_ways(small, monkeypatch)
     planned = replace(small.runs[0], duration=0.05)
     planned = replace(planned, numerics=replace(planned.numerics, integrator="adaptive", tolerance=1e-6))
     values = {"friction.fs": np.array([0.3])}
-    found = block.measured(planned, values, small.metrics, 1)
-    sure, flagged = block.checked(planned, values, small.metrics, found)
+    found = measured.measured(planned, values, small.metrics, 1)
+    sure, flagged = metric_check.checked(planned, values, small.metrics, found)
     assert sure.integrators == ["adaptive"]
     assert not flagged.any()
     assert len(ran) == 2  # as it is, and looser
 
 
 def test_a_case_out_of_bounds_is_a_failure_of_its_own(small):
-    found, why, _ = block.measured(small.runs[0], {"friction.fs": np.array([0.3, -0.1])}, small.metrics, 2)
+    found, why, _ = measured.measured(small.runs[0], {"friction.fs": np.array([0.3, -0.1])}, small.metrics, 2)
     assert np.isfinite(found[0]).all()
     assert np.isnan(found[1]).all()
     assert why[0] == ""
@@ -95,7 +97,7 @@ def test_every_integrator_is_held_against_a_worse_run(small, integrator):
     run = replace(small.runs[0], duration=0.1)
     run = replace(run, numerics=replace(run.numerics, integrator=integrator, output=0.1, tolerance=1e-6))
     one, worse = (
-        block._alone(run, {"friction.fs": 0.35}, ["position_rms_rad"], perturbation)[0][0]
+        measured._alone(run, {"friction.fs": 0.35}, ["position_rms_rad"], perturbation)[0][0]
         for perturbation in (0.0, 2.0)
     )
     assert one != worse  # else nothing would ever be flagged
@@ -106,7 +108,7 @@ def test_metrics_differ_beyond_one_per_cent():
     one = np.array([[1e-3, 5.0], [1e-3, 5.0], [1e-3, np.nan], [1e-10, 5.0]])
     other = np.array([[1.02e-3, 5.0], [1.005e-3, 5.0], [1e-3, 5.0], [2e-10, 5.0]])
     names = ("position_rms_rad", "reversals_per_s")
-    assert block.differ(one, other, names).tolist() == [True, False, True, False]
+    assert metric_check.differ(one, other, names).tolist() == [True, False, True, False]
 
 
 # ---- the data set ------------------------------------------------------------------------------------------
@@ -165,6 +167,51 @@ def test_progress_begins_with_what_was_found_and_that_is_said(small, tmp_path):
     assert told == [(10, 20), (20, 20)]
     execute.run(few, tmp_path, say=said.append)
     assert said == ["1 of 2 blocks were already done; going on", "2 of 2 blocks were already done"]
+
+
+def test_a_block_takes_some_seconds_and_a_resumed_sweep_keeps_its_size(small, tmp_path, monkeypatch):
+    assert forecast.block_size(0.001) == 256
+    assert forecast.block_size(0.1) == 32
+    assert forecast.block_size(60.0) == 1
+    few = replace(small, drawn=replace(small.drawn, cases=10), sizes=())
+    monkeypatch.setattr(execute, "size_timed", lambda sweep, run: 4)
+    assert execute.run(few, tmp_path)["timings"]["blocks_computed"] == 2 * 3
+    whole = table(tmp_path)
+    assert whole["case"].to_pylist() == 2 * list(range(10))
+    next(tmp_path.rglob("*controller=PD/part-000001.parquet")).unlink()
+    # A busier machine would choose others now.
+    monkeypatch.setattr(execute, "size_timed", lambda sweep, run: 2)
+    assert execute.run(few, tmp_path)["timings"]["blocks_computed"] == 1
+    assert table(tmp_path).equals(whole)
+    assert dataset.read(tmp_path, few, few.runs[0], ["flagged"])["flagged"].size == 10
+
+
+def test_what_flagged_means_is_said_in_the_table_and_in_the_file(small, tmp_path):
+    few = replace(small, drawn=replace(small.drawn, cases=3))
+    execute.run(few, tmp_path)
+    rows = summary.summarise(tmp_path, few)
+    assert "changes by more than 0.1 %" in rows[0]["flagged_means"]
+    assert summary.summary_lines(rows, "position_rms_rad")[-1] == f"flagged: {rows[0]['flagged_means']}"
+    assert "every case was run again" in summary.write_summary(tmp_path, few, rows).read_text()
+    assert "check = false" in summary.meaning_of_flags(replace(few, check=False))
+
+
+def test_a_sampled_case_that_is_sure_is_what_simulate_gives(small, monkeypatch):
+    ran = []
+    monkeypatch.setattr(sampled, "run", lambda case, run=sampled.run: ran.append(1) or run(case))
+    run = small.runs[0]
+    control = replace(run.control, sample_time=1e-3, encoder_counts=65536.0)
+    planned = replace(run, control=control, duration=0.3, numerics=replace(run.numerics, output=0.3))
+    values = {"friction.fs": np.array([0.3, 0.35])}
+    found = measured.measured(planned, values, small.metrics, 2)
+    sure, flagged = metric_check.checked(planned, values, small.metrics, found)
+    assert sure.integrators == ["sampled", "sampled"]
+    assert (
+        len(ran) == 4 + flagged.sum()
+    )  # at the tolerance, at a hundredth, and at 1e-10 rad where those differ
+    case = numbers.varied(planned, {"friction.fs": 0.3})
+    alone = ss.simulate(case.axis, case.control, case.motion, 0.3, slip_rule=case.rule)
+    assert sure.metrics[0, 0] == pytest.approx(alone.meta["metrics"][small.metrics[0]], rel=2e-4)
 
 
 def test_fewer_cases_do_not_overwrite_an_interrupted_sweep(tmp_path, capsys):
@@ -310,13 +357,15 @@ def test_more_cases_than_the_disk_has_room_for(small, tmp_path):
         dataset.room_for(tmp_path, huge)
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_every_block_in_hand_is_kept_when_it_is_interrupted(small, tmp_path, monkeypatch, jobs):
+@pytest.mark.parametrize(
+    ("jobs", "how"), [(1, signal.SIGINT), (2, signal.SIGINT), (1, signal.SIGTERM)], ids=["1", "2", "SIGTERM"]
+)
+def test_every_block_in_hand_is_kept_when_it_is_interrupted(small, tmp_path, monkeypatch, jobs, how):
     begun = []
     monkeypatch.setattr(execute, "compute", lambda *task: begun.append(task) or block.compute(*task))
     with pytest.raises(KeyboardInterrupt):
         execute.run(
-            small, tmp_path, jobs=jobs, progress=lambda done, of: done and signal.raise_signal(signal.SIGINT)
+            small, tmp_path, jobs=jobs, progress=lambda done, of: done and signal.raise_signal(how)
             if len(list(tmp_path.rglob("*.parquet"))) == 1 else None,
         )  # fmt: skip
     assert len(begun) == 1 or jobs > 1

@@ -10,7 +10,7 @@ from stickslip.cli import main
 from stickslip.cli import tune as help_of_tune
 from stickslip.errors import ConfigError, InputError
 from stickslip.sweep import tune as tuning
-from stickslip.sweep.block import measured
+from stickslip.sweep.measured import measured
 from stickslip.sweep.plan import load
 
 SMALL = Path(__file__).with_name("small_tune.toml")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,11 +17,17 @@ if TYPE_CHECKING:
 
 COLUMNS = (("position_rms_rad", 1e3, "RMS"), ("position_peak_rad", 1e3, "peak"))
 """Metrics of the table on the terminal, with their factor to mrad."""
+SELDOM = 20.0
+"""s between two lines of progress where there is no terminal."""
 
 
 @contextmanager
 def progress_bar(title: str) -> Generator[Callable[[int, int], None]]:
-    """A bar with the time left on stderr, where that is a terminal; gives ``progress(finished, all)``."""
+    """A bar with the time left on stderr, or a line now and then where that is no terminal; gives
+    ``progress(finished, all)``."""
+    if not sys.stderr.isatty():
+        yield _lines(title)
+        return
     from tqdm import tqdm
 
     with tqdm(desc=title, unit="run", file=sys.stderr, disable=None, leave=False) as bar:
@@ -38,6 +45,26 @@ def progress_bar(title: str) -> Generator[Callable[[int, int], None]]:
                 bar.update(finished - bar.n)
 
         yield progress
+
+
+def _lines(title: str) -> Callable[[int, int], None]:
+    """Progress for a file or a pipe: nothing of what is soon done, then a line every `SELDOM` seconds."""
+    begun = said = time.monotonic()
+    first: int | None = None
+
+    def progress(finished: int, total: int) -> None:
+        nonlocal said, first
+        # The time left is told from what is finished from now on, not from what was found.
+        first = finished if first is None else first
+        now = time.monotonic()
+        if now - said < SELDOM or finished >= total:
+            return
+        said = now
+        pace = (now - begun) / (finished - first) if finished > first else math.nan
+        left = f", about {duration(pace * (total - finished))} left" if math.isfinite(pace) else ""
+        tell(f"stickslip: {title}: {finished} of {total} done{left}")
+
+    return progress
 
 
 def say(what: str) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,20 +42,25 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--print", action="store_true", help="print the sweep's TOML and run nothing")
 
 
-def announce(sweep: Sweep, jobs: int) -> None:
-    """Say before a long sweep starts how long it will take, from a few of its cases."""
+def announced(sweep: Sweep, jobs: int) -> Sweep:
+    """Say before a long sweep starts how long it will take, from a few of its cases; blocks are sized so."""
     from stickslip.cli import _output
-    from stickslip.sweep.forecast import seconds_of
+    from stickslip.sweep.forecast import block_size, paces_of, seconds_of
 
     if sweep.cases < MANY:
-        return
+        return sweep
     told = ""
     if sweep.device == "cpu":  # What runs elsewhere is not timed here.
         _output.say("timing some cases ...")
-        told = f", about {_output.duration(seconds_of(sweep) / jobs)} on {jobs} core{'s' if jobs > 1 else ''}"
+        paces = paces_of(sweep)
+        seconds = _output.duration(seconds_of(sweep, paces) / jobs)
+        told = f", about {seconds} on {jobs} core{'s' if jobs > 1 else ''}"
+        if sweep.step == 0.0:  # Lanes are filled by whole blocks.
+            sweep = replace(sweep, sizes=tuple(map(block_size, paces)))
     _output.tell(
         f"stickslip: {sweep.cases} closed loops{told}; --cases reduces the number; finished blocks are kept"
     )
+    return sweep
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
         _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(planned.left_out)}")
     out: Path = args.out or Path(f"sweep-{planned.name}")
     execute.ready(planned, args.scheduler)
-    announce(planned, args.jobs or os.cpu_count() or 1)
+    planned = announced(planned, args.jobs or os.cpu_count() or 1)
     try:
         with _output.progress_bar(planned.name) as progress:
             found = sweep(

@@ -96,7 +96,7 @@ STOPPING = "finishing the running cases; press Ctrl-C again to abort"
 
 @contextmanager
 def interrupts_between_runs(said: str = STOPPING) -> Generator[Callable[[], None]]:
-    """Hold Ctrl-C back until the run in hand is finished and kept; a second one stops at once.
+    """Hold Ctrl-C and a request to end (SIGTERM) back until the run in hand is kept; a second one stops at once.
 
     Yields what raises KeyboardInterrupt if one was asked for. Raised inside a compilation it would tear the
     compiler down with it. `said` is a line for stderr, at once.
@@ -118,11 +118,12 @@ def interrupts_between_runs(said: str = STOPPING) -> Generator[Callable[[], None
     if threading.current_thread() is not threading.main_thread():
         yield check
         return
-    before = signal.signal(signal.SIGINT, note)
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield check
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _finished(planned: Sequence[PlannedRun], folder: Path, jobs: int) -> Iterator[Run]:

@@ -19,7 +19,7 @@ import numpy as np
 from stickslip.errors import InputError, unwritable
 from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.block import Block
-from stickslip.sweep.plan import BLOCK, Sweep
+from stickslip.sweep.plan import Sweep
 
 OVERHEAD = 4000
 """Bytes that a file of a block takes besides its rows."""
@@ -31,21 +31,38 @@ def block_path(folder: Path, sweep: Sweep, run: int, start: int) -> Path:
     p = sweep.runs[run]
     parts = (f"slip_rule={p.slip_rule}", f"reference={p.reference}", f"friction={p.friction}",
              f"controller={p.controller}")  # fmt: skip
-    return folder.joinpath("data", *parts, f"part-{start // BLOCK:06d}.parquet")
+    return folder.joinpath("data", *parts, f"part-{start // sweep.size_of(run):06d}.parquet")
+
+
+def _parts(folder: Path, sweep: Sweep, run: int) -> list[Path]:
+    """The files of a run's blocks that are there, in order of their cases."""
+    return sorted(block_path(folder, sweep, run, 0).parent.glob("part-*.parquet"))
 
 
 def has_block(folder: Path, sweep: Sweep, run: int, start: int) -> bool:
     """Whether the block lies there, whole, with these numbers."""
-    return fingerprint_of(block_path(folder, sweep, run, start)) == sweep.fingerprint(run)
+    about = _about(block_path(folder, sweep, run, start))
+    return about == {"fingerprint": sweep.fingerprint(run), "size": sweep.size_of(run)}
 
 
 def fingerprint_of(path: Path) -> str | None:
     """What a block was made of; None where it is missing, cut off or something else, and is to be run again."""
+    return _about(path).get("fingerprint")
+
+
+def size_found(folder: Path, sweep: Sweep, run: int) -> int:
+    """Cases in a block of a run, as those that lie there have it; 0 where none does."""
+    sizes = (int(_about(path).get("size", 0)) for path in _parts(folder, sweep, run))
+    return next((size for size in sizes if size), 0)
+
+
+def _about(path: Path) -> dict[str, Any]:
+    """What a file says of its block; nothing where it is missing, cut off or something else."""
     parquet: Any = importlib.import_module("pyarrow.parquet")
     try:
-        return json.loads(parquet.read_schema(path).metadata[KEY])["fingerprint"]
+        return dict(json.loads(parquet.read_schema(path).metadata[KEY]))
     except (OSError, ValueError, KeyError, TypeError):
-        return None
+        return {}
 
 
 def keep_block(folder: Path, sweep: Sweep, block: Block) -> None:
@@ -67,7 +84,9 @@ def keep_block(folder: Path, sweep: Sweep, block: Block) -> None:
     columns["failure"] = pyarrow.array(block.failures, pyarrow.string())
     columns["integrator"] = pyarrow.array(block.integrators, pyarrow.string())
     table = pyarrow.Table.from_arrays(list(columns.values()), names=list(columns))
-    about = json.dumps({"fingerprint": sweep.fingerprint(block.run)}).encode()
+    about = json.dumps(
+        {"fingerprint": sweep.fingerprint(block.run), "size": sweep.size_of(block.run)}
+    ).encode()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         # Another command may write the same block; each has a draft of its own.
@@ -123,7 +142,10 @@ def room_for(folder: Path, sweep: Sweep) -> None:
 
     place = next(p for p in (folder, *folder.resolve().parents) if p.exists())
     row = 8 * (1 + len(sweep.drawn.names) + len(sweep.metrics)) + 2
-    wanted = sweep.cases * row + -(-sweep.drawn.cases // BLOCK) * len(sweep.runs) * OVERHEAD
+    wanted = (
+        sweep.cases * row
+        + sum(-(-sweep.drawn.cases // sweep.size_of(i)) for i in range(len(sweep.runs))) * OVERHEAD
+    )
     free = shutil.disk_usage(place).free
     if wanted > free:
         raise InputError(
@@ -136,28 +158,25 @@ def read(
     folder: Path, sweep: Sweep, run: PlannedRun, columns: Sequence[str]
 ) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
     """Columns of a run's cases, in order of the cases; NaN where there is no number."""
-    index = list(sweep.runs).index(run)
-    found: dict[str, list[Any]] = {name: [] for name in columns}
-    for start in range(0, sweep.drawn.cases, BLOCK):
-        for name, values in read_block(folder, sweep, index, start, columns).items():
-            found[name].append(values)
-    return {name: np.concatenate(parts) if parts else np.zeros(0) for name, parts in found.items()}
+    parts = [_read_part(path, columns) for path in _parts(folder, sweep, list(sweep.runs).index(run))]
+    return {name: np.concatenate([np.zeros(0), *(part[name] for part in parts)]) for name in columns}
 
 
-def rows_of(folder: Path, sweep: Sweep, run: int, start: int) -> int:
-    """Cases that a block's file holds; 0 where it is missing."""
+def rows_of(folder: Path, sweep: Sweep, run: int) -> int:
+    """Cases that a run's files hold."""
     parquet: Any = importlib.import_module("pyarrow.parquet")
-    path = block_path(folder, sweep, run, start)
-    return parquet.read_metadata(path).num_rows if path.exists() else 0
+    return sum(parquet.read_metadata(path).num_rows for path in _parts(folder, sweep, run))
 
 
 def read_block(
     folder: Path, sweep: Sweep, run: int, start: int, columns: Sequence[str]
 ) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
     """Columns of one block's cases; empty ones where it is missing."""
-    parquet: Any = importlib.import_module("pyarrow.parquet")
     path = block_path(folder, sweep, run, start)
-    if not path.exists():
-        return {name: np.zeros(0) for name in columns}
+    return _read_part(path, columns) if path.exists() else {name: np.zeros(0) for name in columns}
+
+
+def _read_part(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+    parquet: Any = importlib.import_module("pyarrow.parquet")
     table = parquet.ParquetFile(path).read(columns=list(columns))
     return {name: table.column(name).to_numpy().astype(np.float64) for name in columns}

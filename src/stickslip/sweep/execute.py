@@ -14,7 +14,7 @@ import time
 import warnings
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from stickslip.study.files import claim_folder, save_manifest
 from stickslip.study.study import interrupts_between_runs
 from stickslip.sweep import dataset
 from stickslip.sweep.block import Block, compute, integrator_of
+from stickslip.sweep.forecast import size_timed
 from stickslip.sweep.plan import BLOCK, Sweep
 
 ADDRESS = re.compile(r"(?:[a-z]+://)?(?:[^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):\d{1,5}/?|inproc://\S+")
@@ -88,6 +89,7 @@ def run(
     ready(sweep, scheduler)
     dataset.room_for(Path(out), sweep)
     folder = claim_folder(Path(out), sweep.name, "sweep")
+    sweep = in_blocks(folder, sweep)
     dataset.refuse_strays(folder, sweep)
     integrators = [integrator_of(sweep, i) for i in range(len(sweep.runs))]
     if say:
@@ -164,7 +166,18 @@ def _passes(check: Callable[[], None]) -> bool:
 
 
 def _size(sweep: Sweep, block: tuple[int, int]) -> int:
-    return min(BLOCK, sweep.drawn.cases - block[1])
+    return min(sweep.size_of(block[0]), sweep.drawn.cases - block[1])
+
+
+def in_blocks(folder: Path, sweep: Sweep) -> Sweep:
+    """The sweep in blocks as those that are there have it, else as it says itself, else of some seconds each."""
+    return replace(
+        sweep,
+        sizes=tuple(
+            dataset.size_found(folder, sweep, i) or (sweep.sizes[i] if sweep.sizes else size_timed(sweep, i))
+            for i in range(len(sweep.runs))
+        ),
+    )
 
 
 # ---- where blocks are computed ---------------------------------------------------------------------------------

@@ -1,8 +1,13 @@
-"""How long a sweep takes, told before it starts: a few of its own cases are timed, with the checks that it runs."""
+"""How long a sweep takes, told before it starts: a few of its own cases are timed, with the checks that it runs.
+
+From the same times follows how many cases make a block: what is in hand is lost when the command is killed.
+"""
 
 from __future__ import annotations
 
+import math
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,22 +20,42 @@ CHUNK = 4
 """Cases timed at once."""
 PATIENCE = 6.0
 """s of timing in all, about."""
+IN_HAND = 4.0
+"""s that a block may take, about."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 """Multiples of it, their whole part left out, are spread evenly from the first one on."""
 
 
-def seconds_of(sweep: Sweep) -> float:
-    """Time of a processor that the sweep takes, s, about: compilation left out.
+def paces_of(sweep: Sweep) -> tuple[float, ...]:
+    """Time of a processor that a case of every run takes, s, about: compilation left out.
 
     Every run is timed with cases of the sweep, evenly spread: compensators hunt in some, whose checks then go on to
     tighter tolerances, so that the nominal case tells too little.
     """
     patience = PATIENCE / len(sweep.runs)
-    return sum(_seconds_of_run(sweep, run, patience) for run in range(len(sweep.runs)))
+    return tuple(_pace_of(sweep, run, patience) for run in range(len(sweep.runs)))
 
 
-def _seconds_of_run(sweep: Sweep, run: int, patience: float) -> float:
-    """Of all cases of one run."""
+def seconds_of(sweep: Sweep, paces: Sequence[float]) -> float:
+    """Time of a processor that the sweep takes, s, about."""
+    return sweep.drawn.cases * sum(paces)
+
+
+def block_size(pace: float) -> int:
+    """Cases that make a block, a power of two, at a time for each, s."""
+    return max(1, min(BLOCK, 2 ** math.floor(math.log2(IN_HAND / pace)))) if pace > 0.0 else BLOCK
+
+
+def size_timed(sweep: Sweep, run: int) -> int:
+    """The same of a run that nobody has timed, from a single case of it; lanes are filled by whole blocks."""
+    if integrator_of(sweep, run)[0] == "lanes":
+        return BLOCK
+    _timed(sweep, run, [0])  # It compiles.
+    return block_size(_timed(sweep, run, [sweep.drawn.cases // 2]))
+
+
+def _pace_of(sweep: Sweep, run: int, patience: float) -> float:
+    """Of one run."""
     cases = sweep.drawn.cases
     if integrator_of(sweep, run)[0] == "lanes":
         # Lanes are filled by whole blocks.
@@ -42,7 +67,7 @@ def _seconds_of_run(sweep: Sweep, run: int, patience: float) -> float:
     while timed < most and spent < patience:
         spent += _timed(sweep, run, [int(cases * (GOLDEN * (timed + i) % 1.0)) for i in range(chunk)])
         timed += chunk
-    return spent * cases / timed
+    return spent / timed
 
 
 def _timed(sweep: Sweep, run: int, cases: list[int]) -> float:

@@ -28,8 +28,10 @@ from stickslip.sweep.sample import LEVEL, METHODS, Drawn, Spread, count_of
 Array = np.ndarray[Any, np.dtype[np.float64]]
 BUILT_IN = ("thesis-robustness", "thesis-gain")
 BLOCK = 256
-"""Cases in a file of the data set."""
+"""Cases in a file of the data set, at most."""
 USUAL = ("position_rms_rad", "position_peak_rad", "velocity_rms_rad_s", "torque_rms_Nm")
+MADE_BY = ("block.py", "measured.py", "metric_check.py")
+"""What the numbers of a case come from, besides the engine."""
 MOST_CASES = 1_000_000_000
 MOST_SEED = 2**63
 """What files that hold it can say as a number"""
@@ -47,8 +49,8 @@ class Sweep:
         The cases.
     metrics : tuple of str
     check : bool
-        Whether every case is run twice more with wrong steps, and those that differ tighter, to flag those whose
-        metrics are not sure; in lanes once more, with twice the step.
+        Whether every case is run again, with wrong steps or tighter, to flag those whose metrics are not sure
+        (`stickslip.sweep.metric_check`); in lanes with twice the step.
     study : Study
     config : mapping
         The sweep's TOML as read.
@@ -63,6 +65,8 @@ class Sweep:
         Where lanes run.
     left_out : tuple of str
         Estimates of the model that do not vary: they are not parameters of its law.
+    sizes : tuple of int
+        Cases in a block of every run; `BLOCK` where it is empty. The numbers are the same.
     """
 
     name: str
@@ -80,11 +84,17 @@ class Sweep:
     step: float = 0.0
     device: str = "cpu"
     left_out: tuple[str, ...] = ()
+    sizes: tuple[int, ...] = ()
+
+    def size_of(self, run: int) -> int:
+        """Cases in a block of a run."""
+        return self.sizes[run] if self.sizes else BLOCK
 
     @property
     def blocks(self) -> list[tuple[int, int]]:
         """Run and first case of every block, in order."""
-        return [(i, at) for i in range(len(self.runs)) for at in range(0, self.drawn.cases, BLOCK)]
+        starts = [range(0, self.drawn.cases, self.size_of(i)) for i in range(len(self.runs))]
+        return [(i, at) for i, each in enumerate(starts) for at in each]
 
     @property
     def cases(self) -> int:
@@ -94,8 +104,8 @@ class Sweep:
     def fingerprint(self, run: int) -> str:
         """A hash of everything that determines the numbers of a run's cases."""
         content = [
-            self.runs[run].fingerprint, asdict(self.drawn), self.metrics, self.check, BLOCK,
-            file_hash(Path(__file__).with_name("block.py")),
+            self.runs[run].fingerprint, asdict(self.drawn), self.metrics, self.check,
+            *(file_hash(Path(__file__).with_name(name)) for name in MADE_BY),
         ]  # fmt: skip
         if self.step > 0.0:
             content += [self.step, self.device]

@@ -55,7 +55,7 @@ def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comp
     sweep = _sweep_of(folder, manifest)
     ready(sweep)
     for i, run in enumerate(sweep.runs):
-        found = sum(dataset.rows_of(folder, sweep, i, at) for at in range(0, sweep.drawn.cases, BLOCK))
+        found = dataset.rows_of(folder, sweep, i)
         if found != sweep.drawn.cases:
             raise InputError(f"{folder}: {run.key} has {found} of {sweep.drawn.cases} cases;"
                              " run the sweep again to complete it")  # fmt: skip
@@ -79,7 +79,8 @@ def _sweep_of(folder: Path, manifest: Mapping[str, Any]) -> Sweep:
     source, study, *others = manifest["inputs"]
     moved = {entry["written"]: (folder / entry["copy"]).resolve() for entry in (study, *others)}
     sweep = load(folder / source["copy"], moved)
-    return replace(sweep, drawn=replace(sweep.drawn, cases=int(manifest["cases"])))
+    sizes = tuple(dataset.size_found(folder, sweep, i) or BLOCK for i in range(len(sweep.runs)))
+    return replace(sweep, drawn=replace(sweep.drawn, cases=int(manifest["cases"])), sizes=sizes)
 
 
 def _compared(folder: Path, sweep: Sweep, block: Block) -> tuple[list[str], float]:

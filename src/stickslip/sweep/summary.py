@@ -21,6 +21,21 @@ LEAST_CASES = 20
 """Fewer cases than this say nothing of a percentile."""
 
 
+def meaning_of_flags(sweep: Sweep) -> str:
+    """What it says of a case that it is flagged, and what was run to find out."""
+    if not sweep.check:
+        return "nothing: no case was run again (check = false)"
+    if sweep.step > 0.0:
+        return (
+            "twice the time step changes a metric by more than 0.3 %: every case was run again so, and the motion of "
+            "these hangs on details that nobody knows"
+        )
+    return (
+        "every case was run again with other errors of its steps (check), and a metric of these changes by more than "
+        "0.1 %: their motion hangs on details that nobody knows, and each is one of many that could be"
+    )
+
+
 def summarise(folder: Path, sweep: Sweep) -> list[dict[str, Any]]:
     """A row a run: its key, numbers of cases, flagged and failed ones, and percentiles of every metric."""
     rows: list[dict[str, Any]] = []
@@ -34,7 +49,7 @@ def summarise(folder: Path, sweep: Sweep) -> list[dict[str, Any]]:
             row[f"{name}_missing"] = int(first.size - values.size)
             for p in PERCENTILES:
                 row[f"{name}_p{p}"] = float(np.percentile(values, p)) if values.size else float("nan")
-        rows.append(row)
+        rows.append(row | {"flagged_means": meaning_of_flags(sweep)})
     return rows
 
 
@@ -54,7 +69,7 @@ def write_summary(folder: Path, sweep: Sweep, rows: Sequence[Mapping[str, Any]])
 
 
 def summary_lines(rows: Sequence[Mapping[str, Any]], metric: str) -> list[str]:
-    """A line a run under a heading: percentiles of a metric, flagged and missing cases."""
+    """A line a run under a heading: percentiles of a metric, flagged and missing cases; last what flagged means."""
     keys = ["/".join(str(row[part]) for part in KEYS) for row in rows]
     width = max(24, *(len(key) for key in keys))
     heads = ("5 %", "50 %", "95 %", "worst")
@@ -63,7 +78,7 @@ def summary_lines(rows: Sequence[Mapping[str, Any]], metric: str) -> list[str]:
         cells = "".join(f"{row[f'{metric}_p{p}']:>12.4g}" for p in PERCENTILES)
         flagged = f"{100.0 * row['flagged'] / max(1, row['cases']):.2f} %"
         out.append(f"{key:<{width}}{cells}{flagged:>10}{row[f'{metric}_missing']:>9}")
-    return out
+    return [*out, *dict.fromkeys(f"flagged: {row['flagged_means']}" for row in rows)]
 
 
 # ---- what uncertainty does ---------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.study.planned_run import PlannedRun
-from stickslip.sweep.block import measured
+from stickslip.sweep.measured import measured
 from stickslip.sweep.numbers import belongs, value_of
 from stickslip.sweep.plan import Sweep
 from stickslip.sweep.ranges import admitted

@@ -39,8 +39,8 @@ class SweepResult:
     folder : Path
         Where the data set, manifest.json and summary.csv are.
     rows : sequence of mapping
-        One a run: its slip rule, reference, friction and controller, cases, flagged ones, and percentiles of every
-        metric (``position_rms_rad_p95``).
+        One a run: its slip rule, reference, friction and controller, cases, flagged ones, percentiles of every
+        metric (``position_rms_rad_p95``), and what flagged means (``flagged_means``).
     manifest : mapping
         What was run, with which versions, and how long it took.
     files : tuple of Path
@@ -157,7 +157,7 @@ def sweep(
     """
     planned = sweep_of(file, cases)
     if jobs < 0:
-        raise InputError(f"--jobs {jobs} must be at least 1; leave it out for one block per core")
+        raise InputError(f"jobs = {jobs} must be at least 0; 0, or none, is one block a core")
     insist_on_jobs(jobs or 1)
     out = Path(folder) if folder is not None else Path(f"sweep-{planned.name}")
     execute.ready(planned, scheduler)
