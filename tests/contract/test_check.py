@@ -147,7 +147,8 @@ def _stiffer(elements):
     ("text", "powers"),
     [
         ("N·m", (1, 1, 0, 0)), ("N·m/(rad·s)", (1, 1, -1, -1)), ("N·m·s/rad", (1, 1, -1, 1)), ("-", (0, 0, 0, 0)),
-        ("kg·m²", (1, 1, 0, 2)), ("1/K", (0, 0, 0, 0)), ("N·m·(s/rad)^δ", None), ("lbf", None),
+        ("kg·m²", (1, 1, 0, 2)), ("1/K", (0, 0, 0, 0)), ("rad^0.5/s^1.5", (0, 0, 0.5, -1.5)),
+        ("N·m·(s/rad)^δ", None), ("lbf", None),
     ],
 )  # fmt: skip
 def test_units_are_read(text, powers):

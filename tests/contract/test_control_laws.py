@@ -120,7 +120,9 @@ def test_the_continuous_forms_of_friction_laws_and_estimators_are_tried():
 
 def test_what_begins_to_grow_after_half_an_hour_at_rest_is_told():
     """The hour is cut short only where all that remains is the minute that was, bit for bit."""
-    assert at_rest(broken(winds_up_late)).passed is False
+    told = at_rest(broken(winds_up_late))
+    assert told.passed is False
+    assert "state loop_sum is " in told.text
     assert at_rest(control_law("pd")).passed
 
 

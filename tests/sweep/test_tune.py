@@ -1,6 +1,7 @@
 """Tuning: the best of what was tried, better than a grid of settings, worse nowhere than it says."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from stickslip.errors import ConfigError, InputError
 from stickslip.sweep import tune as tuning
 from stickslip.sweep.measured import measured
 from stickslip.sweep.plan import load
+from stickslip.sweep.sample import Spread
 
 SMALL = Path(__file__).with_name("small_tune.toml")
 
@@ -59,9 +61,23 @@ def test_it_beats_every_point_of_a_grid(found):
 def test_the_same_again(found):
     sweep, tuned = found
     assert np.array_equal(tuning.tune(sweep, sweep.runs[0]).after, tuned.after)
-    said = repr(tuned).splitlines()
+    said = repr(replace(tuned, at_bounds={})).splitlines()
     assert len(said) == 1 + len(tuned.names) + len(tuned.measured)
     assert said[-1].endswith(f"{sweep.percentile:g} % of the cases below>")
+
+
+def test_a_setting_that_stops_at_its_bound_is_told(found):
+    sweep, tuned = found
+    spreads, bases = (
+        (Spread("controller.gain", 0.5, 1.5), Spread("controller.bandwidth_hz", 3.0, 12.0)),
+        (1.0, 1.0),
+    )
+    run = sweep.runs[0]
+    assert tuning.at_bounds(run, spreads, bases, np.array([1.0, 11.986])) == {"controller.bandwidth_hz": 12.0}
+    assert tuning.at_bounds(run, spreads, bases, np.array([0.5, 11.5])) == {"controller.gain": 0.5}
+    told = replace(tuned, at_bounds={"controller.bandwidth_hz": 12.0})
+    assert "controller.bandwidth_hz stops at the end of its range, 12: the best may lie beyond" in str(told)
+    assert told.as_dict()["at_bounds"] == {"controller.bandwidth_hz": 12.0}
 
 
 def test_a_failed_case_counts_as_the_worst():

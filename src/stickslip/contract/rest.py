@@ -43,7 +43,10 @@ def at_rest(law: ControlLaw) -> Verdict:
         last = np.concatenate([np.abs(sampled.state), [np.abs(torque).max()]])
         if not np.all(last <= 1.01 * first + 1e-9) or sampled.memory[sampled.fault] != 0.0:
             i = int(np.argmax(last - first))
-            return failed("rest", f"{name}: {first[i]:.6g} after two minutes, {last[i]:.6g} after an hour")
+            what = [*(f"state {n}" for n in specimen(law).state_names()), "the torque"][i]
+            return failed(
+                "rest", f"{name}: {what} is {first[i]:.6g} after two minutes, {last[i]:.6g} after an hour"
+            )
     return held("rest", "an hour at rest and an hour at the limit: state and torque as after two minutes")
 
 

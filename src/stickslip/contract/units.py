@@ -14,7 +14,7 @@ from stickslip.spec import Field, Law, Surroundings
 from stickslip.trial import moments
 
 POWERS = {"²": "2", "³": "3", "⁴": "4", "⁻¹": "-1", "⁻²": "-2"}
-WORD = re.compile(r"(N|m|rad|s|kg|J|W|Hz|K|°C|-|1)(?:\^(-?\d+))?")
+WORD = re.compile(r"(N|m|rad|s|kg|J|W|Hz|K|°C|-|1)(?:\^(-?\d+(?:\.\d+)?))?")
 ROUNDING = 1e-9
 """Share of the largest torque; factors of two change no digit, but what is made of them may."""
 
@@ -22,12 +22,12 @@ ROUNDING = 1e-9
 class Unit(NamedTuple):
     """Powers of newton, metre, radian and second."""
 
-    newton: int = 0
-    metre: int = 0
-    radian: int = 0
-    second: int = 0
+    newton: float = 0
+    metre: float = 0
+    radian: float = 0
+    second: float = 0
 
-    def times(self, other: Unit, power: int) -> Unit:
+    def times(self, other: Unit, power: float) -> Unit:
         """The product with a power of another unit."""
         return Unit(*(a + power * b for a, b in zip(self, other)))
 
@@ -59,7 +59,7 @@ def parsed(text: str) -> Unit | None:
             word = WORD.fullmatch(token)
             if word is None:
                 return None
-            whole = whole.times(WORDS[word[1]], over * int(word[2] or 1))
+            whole = whole.times(WORDS[word[1]], over * float(word[2] or 1))
             over = over if depth else 1
     return None if depth else whole
 

@@ -182,6 +182,16 @@ class Composed:
                 flat.extend(value)
         return flat
 
+    def state_names(self) -> list[str]:
+        """The name of every number of `packed_state`; of lists with their places, ``observer_z[0]``."""
+        z, plain, listed = self.state(), list[str](), list[str]()
+        for f, path in zip(self.state_fields, self._paths("state_fields")):
+            if f.per_element:
+                listed += [f"{f.name}[{i}]" for i in range(len(_at(z, path)))]
+            else:
+                plain.append(f.name)
+        return plain + listed
+
     @arguments_checked
     def unpacked_state(self, flat: Sequence[float]) -> SimpleNamespace:
         """The state of the laws that `packed_state` made this flat list of."""

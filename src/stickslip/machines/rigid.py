@@ -10,6 +10,9 @@ from stickslip.errors import ParameterError
 from stickslip.model import Model
 from stickslip.values import making, standard_of
 
+ABSOLUTE_ZERO = -273.15
+"""°C"""
+
 
 @constructor_named
 @dataclass(frozen=True, repr=False)
@@ -39,8 +42,11 @@ class RigidAxis:
             raise ParameterError(f"axis: inertia = {self.inertia:g} kg·m² must be greater than 0 and finite")
         if not (math.isfinite(self.load) and self.load >= 0.0):
             raise ParameterError(f"axis: load = {self.load:g} must be a finite number of at least 0")
-        if not math.isfinite(self.temperature):
-            raise ParameterError(f"axis: temperature = {self.temperature:g} °C must be a finite number")
+        if not (math.isfinite(self.temperature) and self.temperature >= ABSOLUTE_ZERO):
+            raise ParameterError(
+                f"axis: temperature = {self.temperature:g} °C must be a finite number of at least {ABSOLUTE_ZERO:g} °C, "
+                "absolute zero"
+            )
 
     def __repr__(self) -> str:
         return making(self, standard_of(RigidAxis))

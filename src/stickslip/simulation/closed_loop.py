@@ -253,7 +253,8 @@ def _grid(output: float | Vector, duration: float) -> Any:
         count = math.floor(ratio) if math.isfinite(ratio) else ratio
         if count > 50_000_000:
             raise ParameterError(
-                f"simulate: output = {output:g} s gives {count:.3g} rows; use a larger spacing"
+                f"simulate: duration = {duration:g} s in rows every output = {output:g} s makes {count:.3g} rows; "
+                "use a shorter duration or a larger output"
             )
         # Multiples of the spacing, not a running sum, so that the grid is what a person would write down.
         return np.minimum(np.arange(count + 1) * output, duration)

@@ -20,6 +20,8 @@ from stickslip.study.result import Run
 
 SLIP_RULES = ("signed", "literal")
 BUILT_IN = ("thesis", "imperfections", "thesis-rig")
+BENCH = "compensators"
+"""The bench that ships beside them (`stickslip.study.bench`)"""
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ def load(
     path = Path(study)
     if path.suffix != ".toml" and not path.exists():
         raise ConfigError(
-            f"unknown study {name!r}; give the path of a TOML file, or one of {', '.join(BUILT_IN)}"
+            f"unknown study {name!r}; give the path of a TOML file, or one of {', '.join((*BUILT_IN, BENCH))}"
         )
     return _study(path.stem, path, _with(given, read_toml(path, moved=moved)))
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,10 +21,13 @@ from stickslip.sweep.measured import measured
 from stickslip.sweep.numbers import belongs, value_of
 from stickslip.sweep.plan import Sweep
 from stickslip.sweep.ranges import admitted
+from stickslip.sweep.sample import Spread
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 POPULATION, GENERATIONS = 6, 12
 MOST_CASES = 4096
+AT_END = 0.01
+"""Part of a range from whose end on a setting counts as at it: the search comes no nearer to a bound."""
 FAILED = 1e30
 """What counts for a setting with which more cases fail than the percentile leaves out."""
 
@@ -48,6 +51,8 @@ class Tuned:
         The sweep's metrics.
     percentile : float
         %, of the cases, whose metrics are the scores.
+    at_bounds : mapping
+        The settings that stop at an end of their range, and that end: the best may lie beyond.
     """
 
     run: PlannedRun
@@ -60,6 +65,7 @@ class Tuned:
     scores: Array
     measured: tuple[str, ...] = ()
     percentile: float = math.nan
+    at_bounds: Mapping[str, float] = field(default_factory=dict[str, float])
 
     @property
     def settings(self) -> dict[str, float]:
@@ -76,7 +82,7 @@ class Tuned:
         return {
             "run": self.run.key, "settings": self.settings, "before": dict(zip(self.names, self.before.tolist())),
             "metrics": self.metrics, "metrics_before": dict(zip(self.measured, self.scores_before.tolist())),
-            "tried": len(self.tried),
+            "tried": len(self.tried), "at_bounds": dict(self.at_bounds),
         }  # fmt: skip
 
     def __str__(self) -> str:
@@ -86,6 +92,11 @@ class Tuned:
         for name, before, after in zip(self.measured, self.scores_before, self.scores_after, strict=True):
             share = f" {self.percentile:g} % of the cases below"
             lines.append(f"    {name:<32}{before:>12.5g} -> {after:<12.5g}{share}")
+        for name, bound in self.at_bounds.items():
+            lines.append(
+                f"    {name} stops at the end of its range, {bound:.5g}: the best may lie beyond; widen the range if "
+                "the machine stands it"
+            )
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -149,8 +160,25 @@ def tune(sweep: Sweep, run: PlannedRun, progress: Callable[[int, int], None] | N
     as_it_was = measured(run, uncertain, sweep.metrics, sweep.drawn.cases).metrics
     return Tuned(
         run, tuple(s.name for s in spreads), before, tried[best], percentiles(as_it_was, sweep.percentile), every[best],
-        np.array(tried), every, tuple(sweep.metrics), sweep.percentile,
+        np.array(tried), every, tuple(sweep.metrics), sweep.percentile, at_bounds(run, spreads, bases, tried[best]),
     )  # fmt: skip
+
+
+def at_bounds(
+    run: PlannedRun, spreads: Sequence[Spread], bases: Sequence[float], found: Array
+) -> dict[str, float]:
+    """Which of the numbers lie at an end of their range, and that end."""
+    out: dict[str, float] = {}
+    for s, base, number in zip(spreads, bases, found.tolist()):
+        low, high = (admitted(run, s.name, base * float(s.at(np.asarray(u)))) for u in (0.0, 1.0))
+        near_low, near_high = (
+            admitted(run, s.name, base * float(s.at(np.asarray(u)))) for u in (AT_END, 1.0 - AT_END)
+        )
+        if abs(number - low) <= abs(near_low - low):
+            out[s.name] = low
+        elif abs(number - high) <= abs(near_high - high):
+            out[s.name] = high
+    return out
 
 
 def _finite(value: float) -> float:

@@ -28,6 +28,7 @@ def write(folder: Path, sweep: Sweep, tuned: Tuned) -> list[Path]:
             "percentile": sweep.percentile,
             "settings": dict(zip(tuned.names, tuned.after.tolist())),
             "gains": tuned_gains(tuned),
+            "at_bounds": dict(tuned.at_bounds),
             "metrics": dict(zip(sweep.metrics, tuned.scores_after.tolist())),
             "metrics_before": dict(zip(sweep.metrics, tuned.scores_before.tolist())),
         }

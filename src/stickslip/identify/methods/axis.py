@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis.agreed import regressed
 from stickslip.identify.axis.identify import AUTOMATIC, identify_axis
 from stickslip.identify.axis.over_angle import over_angle
 from stickslip.identify.axis.plain import inverse_identification
-from stickslip.identify.axis.search import Extras
+from stickslip.identify.axis.problem import mechanics_parameters
+from stickslip.identify.axis.search import LEVELS, Extras, require_known
 from stickslip.identify.estimate import Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.methods._experiments import driven, experiments_of
 from stickslip.identify.methods._play import with_dead_travel
-from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.methods.method import Method, Options, law_of
 from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
@@ -52,6 +54,7 @@ def identified(
 ) -> Identification:
     """The axis from the first so many experiments, judged by the rest."""
     fitted, held = experiments[:count], experiments[count:]
+    refuse_for_every_law(axis, fitted, options)
     if options.inverse:
         plain = inverse_dynamics(
             fitted, axis, per_direction=options.per_direction, harmonics=options.harmonics
@@ -64,6 +67,26 @@ def identified(
         per_direction=options.per_direction, robust=options.robust, intervals=options.intervals, skew=skew,
         regress=options.regress, progress=options.progress,
     )  # fmt: skip
+
+
+def refuse_for_every_law(axis: ServoAxis, experiments: Sequence[Experiment], options: Options) -> None:
+    """Refuse what is wrong whatever the law: each law's search would say the same once more.
+
+    Raises
+    ------
+    InputError
+        If an inertia is given that is not positive, or a parameter is named that neither a law nor the axis has.
+    """
+    inertia = options.values.get("inertia", 1.0)
+    if not inertia > 0.0:
+        raise InputError(f"inertia = {inertia:g} {axis.unit('kg·m²')} must be greater than 0")
+    count = options.harmonics
+    of_axis = {p.name for p in mechanics_parameters(axis, experiments[0].quantity, {}, count, count)}
+    known = of_axis | {f.name for x in options.laws or AUTOMATIC for f in law_of(x).fields} | LEVELS
+    names = [*options.values, *options.free, *options.frozen]
+    # One direction's own parameters, and torques over the position, are known where they are searched for.
+    plain = [n for n in names if not n.endswith(NEGATIVE) and not n.startswith(("cos", "sin", "friction_"))]
+    require_known(plain, known)
 
 
 def skew_of(experiments: Sequence[Experiment], options: Options) -> float | None:
