@@ -96,8 +96,8 @@ class ReferenceKind(Described):
     ----------
     profile : callable
         ``profile(t, p, out)`` writes ``out.position``, ``out.velocity`` and ``out.acceleration`` at time t,
-        in the scalar subset. At a jump it writes what comes behind: a sampled controller reads the motion at its samples'
-        times exactly, as ``Reference.sample`` gives it.
+        in the scalar subset. At a jump it writes what comes behind: a sampled controller reads the motion at its
+        samples' times exactly, as ``Reference.sample`` gives it.
     breaks : callable
         ``breaks(p, duration)``: times inside (0, duration) where the motion is not smooth or its velocity
         passes through zero; integrators step onto them.

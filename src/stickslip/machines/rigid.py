@@ -44,8 +44,8 @@ class RigidAxis:
             raise ParameterError(f"axis: load = {self.load:g} must be a finite number of at least 0")
         if not (math.isfinite(self.temperature) and self.temperature >= ABSOLUTE_ZERO):
             raise ParameterError(
-                f"axis: temperature = {self.temperature:g} °C must be a finite number of at least {ABSOLUTE_ZERO:g} °C, "
-                "absolute zero"
+                f"axis: temperature = {self.temperature:g} °C must be a finite number of at least "
+                f"{ABSOLUTE_ZERO:g} °C, absolute zero"
             )
 
     def __repr__(self) -> str:

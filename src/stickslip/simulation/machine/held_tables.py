@@ -1,5 +1,5 @@
-"""What a machine whose contact holds at rest is moved by: flows of the axis with its contact free and held at rest, what
-both show between the ends of a step, and the series of either for steps of any length.
+"""What a machine whose contact holds at rest is moved by: flows of the axis with its contact free and held at rest,
+what both show between the ends of a step, and the series of either for steps of any length.
 """
 
 from __future__ import annotations

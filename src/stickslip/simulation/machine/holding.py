@@ -2,9 +2,9 @@
 
 While it holds, the rest of the axis moves exactly, with the disk where it is. While it slides, its viscous friction
 belongs to the linear part; the rest of its torque is linear in time over a step, its end solved from the law's own
-``step``: Coulomb's law is exact. What lies between
-the ends of a step is shown by nodes: the load on the disk at rest, or its velocity. Where a load comes to what the contact
-withstands, or a velocity to rest, the step is halved until it resolves every mode; then it ends there (`series`).
+``step``: Coulomb's law is exact. What lies between the ends of a step is shown by nodes: the load on the disk at rest,
+or its velocity. Where a load comes to what the contact withstands, or a velocity to rest, the step is halved until it
+resolves every mode; then it ends there (`series`).
 
 Behind an event the next step leads back to a half, quarter and so on of the sample, whose flows are kept.
 """
@@ -12,7 +12,6 @@ Behind an event the next step leads back to a half, quarter and so on of the sam
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from stickslip.jit import call_holding, call_step, columns_times, kernel, pointer, record_at
 from stickslip.simulation.case_arrays import AROUND
@@ -217,7 +216,7 @@ def rests(plant: Plant, level: int, h: float, kept: bool, forced: bool) -> tuple
     at, before = 1.0, load_now(plant)
     for side in (1.0, -1.0):
         level_at = withstood(plant, side)
-        first, most, node = extreme(plant, side, side * before, level_at)
+        first, most, _ = extreme(plant, side, side * before, level_at)
         if (forced and first == 0) or (first < 0 and most <= level_at):
             continue
         if level < n.resolving + LOOKS and (first < 0 or level < n.resolving):
@@ -285,7 +284,7 @@ def slides(plant: Plant, side: float, level: int, h: float, block: int, kept: bo
     start = end if flat else start
     show(plant, FREE, level, h, kept, start, end)
     leaves = v0 == 0.0
-    first, most, node = extreme(plant, -side, -side * v0, 0.0)
+    first, most, _ = extreme(plant, -side, -side * v0, 0.0)
     # A disk that leaves rest is nearest to it where it starts.
     if first < 0 and most > 0.0 and not leaves and level < n.resolving + LOOKS:
         return CLOSER, 1.0

@@ -121,7 +121,10 @@ def _results(runs: list[_Ran], tolerance: float, metered: bool) -> dict[str, Any
     """How far two runs lie apart, where there are two, and the metrics of the first."""
     out: dict[str, Any] = {}
     if len(runs) == 2:
-        apart = np.abs(runs[0].rows[:, 3] - runs[1].rows[:, 3])
+        both = min(len(run.rows) for run in runs)
+        apart = np.abs(runs[0].rows[:both, 3] - runs[1].rows[:both, 3])
+        if runs[1].code:  # What the finer run did not come through is not known to be right.
+            apart = np.array([np.inf])
         least = LEAST * float(tolerance)
         out["accuracy"] = {"error_rad": max(SURE * float(np.max(apart, initial=0.0)), least)}
     if metered and runs[0].code == 0:

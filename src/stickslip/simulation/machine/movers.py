@@ -18,8 +18,8 @@ from stickslip.simulation.train.records import train_of
 
 
 def mover(located: bool, holds: bool) -> int:
-    """The address of a machine's way across a sample: the located flow of its train, steps between the events of a contact
-    that holds at rest, or sub-steps.
+    """The address of a machine's way across a sample: the located flow of its train, steps between the events of a
+    contact that holds at rest, or sub-steps.
 
     All take the addresses of a `Plant`, then what `substep.cross` takes, whose value they return.
     """

@@ -95,8 +95,8 @@ class Laid(NamedTuple):
     waves : array, shape (3 n,)
         Order, amplitude and phase of every harmonic: those of the contact's ripple, then of the cogging.
     matrix : array
-        By part of the contact's stiffness and length of the sub-step: `COLUMNS` columns of `SLOTS` numbers; of a contact
-        that holds at rest what `stickslip.simulation.machine.held_tables` writes.
+        By part of the contact's stiffness and length of the sub-step: `COLUMNS` columns of `SLOTS` numbers; of a
+        contact that holds at rest what `stickslip.simulation.machine.held_tables` writes.
     search : array
         What the root finder keeps (`stickslip.simulation.root.ROOT`).
     axis : array, shape (2 SLOTS,)

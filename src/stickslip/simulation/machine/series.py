@@ -39,8 +39,8 @@ def expanded(plant: Plant, kind: int, h: float) -> None:
 
 @kernel()
 def piece(plant: Plant, h: float, s: float) -> None:
-    """Write the states at the part s of the step over h, s, that was `expanded`, behind those at its start; and what the
-    contact's torque takes off them, by its values at both ends."""
+    """Write the states at the part s of the step over h, s, that was `expanded`, behind those at its start; and what
+    the contact's torque takes off them, by its values at both ends."""
     n, mem = plant.machine, plant.matrix
     held, last, power, grown = SCRATCH, SCRATCH + TERMS, SCRATCH + 2 * TERMS, s * h
     part = 1.0
@@ -60,8 +60,9 @@ def piece(plant: Plant, h: float, s: float) -> None:
 
 @kernel()
 def speed_curve(plant: Plant, h: float, start: float, rise: float, late: int) -> None:
-    """Write the disk's velocity as a polynomial of the part of the step, the contact's torque being `start`, N·m, and from
-    there on rising: evenly, by `rise` in a whole step (`late` 1); or by `rise` up to wherever one asks (`late` 0)."""
+    """Write the disk's velocity as a polynomial of the part of the step, the contact's torque being `start`, N·m, and
+    from there on rising: evenly, by `rise` in a whole step (`late` 1); or by `rise` up to wherever one asks (`late` 0).
+    """
     n, mem = plant.machine, plant.matrix
     turning = n.disk + 1
     for k in range(n.terms + 2):
@@ -107,8 +108,8 @@ def curve_at(plant: Plant, s: float) -> float:
 
 @kernel()
 def first_root(plant: Plant, sign: float, level: float, low: float, high: float) -> float:
-    """Where between two parts of a step the polynomial, times a sign, comes to a level from below: the end of an interval
-    too short to matter."""
+    """Where between two parts of a step the polynomial, times a sign, comes to a level from below: the end of an
+    interval too short to matter."""
     f_low, f_high = sign * curve_at(plant, low) - level, sign * curve_at(plant, high) - level
     kept = 0
     for _ in range(ROOT_STEPS):
