@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -252,6 +253,23 @@ def test_a_loop_that_is_not_gains_alone_is_tried_as_it_is():
     assert scaled(Controller(loop=sliding, sample_time=T), 2.0) is None
 
 
+def test_where_a_law_bends_no_poles_are_told_and_the_rig_alone_says_what_it_does(bent):
+    """A loop whose poles were "stable" for motion that its law is not linear over swung by itself."""
+    controller = bent("5.0 * y.error - 0.05 * p.width * math.tanh(y.velocity / p.width)", 0.01)
+    found = confirmed_controller(DRY, controller)
+    point = found.points[0]
+    assert not point.is_linear
+    assert point.linear_to < found.amplitude
+    said = "\n".join(found.lines())
+    assert "do what the poles say" not in said
+    assert (
+        "1 of 1 loops have no poles for such motion: the controller is linear about rest only up to" in said
+    )
+    margins = controller_stability(axis_of(DRY, found.amplitude), controller, DRY.delay)
+    assert not any("stable pole" in line for line in margins.lines())
+    assert margins.as_dict()["loops"][0] == {"name": "sticking", "stable": None}
+
+
 def test_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("c.toml").write_text(FILE)
@@ -266,7 +284,13 @@ def test_the_command(tmp_path, monkeypatch, capsys):
     assert data["loops"][0]["stable"] is True
     assert len(data["gain"]) == len(data["frequency"])
     assert main([*line, "--confirm"]) == 0
-    assert "8 of 8 loops do what the poles say" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "8 of 8 loops do what the poles say" in said
+    one, other = (
+        re.search(r"motion of (\S+ \S+) at the encoder", said),
+        re.search(r"poles of motion of (\S+ \S+):", said),
+    )
+    assert one[1] == other[1]  # both halves speak of the same motion
     for wrong, words in (
         (["--bandwidth", "20"], "--bandwidth cannot be combined with --controller c.toml, which defines it"),
         (["--confirm", "--delay", "0.5"], "--confirm runs the machine with its own delay"),

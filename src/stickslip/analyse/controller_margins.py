@@ -83,7 +83,8 @@ class ControllerStability:
     cycle : Cycle or None
         Where an unstable loop ends while it sticks.
     linear_to : float
-        Motion at the encoder up to which the laws are linear, rad, and these loops theirs; at most `reach`.
+        Motion at the encoder up to which the laws are linear at the frequencies of both loops, rad, and these loops
+        theirs; at most `reach`. Below `amplitude` there are no poles to be told (`is_linear`).
     frequency, response : arrays, shape (n,)
         Hz, and the transfer function from error to torque while the contact sticks, N·m/rad, complex.
     """
@@ -101,6 +102,16 @@ class ControllerStability:
     response: Any
 
     @property
+    def is_linear(self) -> bool:
+        """Whether the controller is linear over the motion that its poles are said of: else it has none."""
+        return self.linear_to >= self.amplitude
+
+    @property
+    def told_cycle(self) -> Cycle | None:
+        """The cycle, where the controller is linear up to it."""
+        return self.cycle if self.linear_to >= self.reach else None
+
+    @property
     def reach(self) -> float:
         """The largest motion that is spoken of, rad: the small one, or what it grows to."""
         return reach_of(self.amplitude, self.cycle)
@@ -116,12 +127,13 @@ class ControllerStability:
         return {
             "laws": list(self.laws), "amplitude": self.amplitude, "contact_stiffness": self.stiffness,
             "sample_time": self.sample_time, "estimator_delay": self.estimator_delay, "softer": self.softer,
-            "cycle": vars(self.cycle) if self.cycle else None, "linear_to": self.linear_to,
+            "cycle": vars(self.told_cycle) if self.told_cycle else None, "linear_to": self.linear_to,
+            "linear": self.is_linear,
             "loops": [
                 {
                     "name": loop.name, "stable": loop.poles.stable, "growth": loop.poles.growth,
                     "frequency": loop.poles.frequency, "torque": list(loop.torque), "delay": loop.delay,
-                }
+                } if self.is_linear else {"name": loop.name, "stable": None}
                 for loop in self.loops
             ],
             "frequency": self.frequency.tolist(),
@@ -136,20 +148,10 @@ class ControllerStability:
         yield f"controller: {'; '.join(self.laws)}"
         yield (
             f"sample time {1e3 * self.sample_time:g} ms, velocity {1e3 * self.estimator_delay:.3g} ms late; motion of "
-            f"{1e6 * self.amplitude:.3g} µrad at the encoder, {self._contact()}"
+            f"{quantity(self.amplitude, 'rad')} at the encoder, {self._contact()}"
         )
-        yield f"{'':<10}{'':<10}{'least stable pole':<22}{'torque times':>16}{'samples later':>16}"
-        for loop in self.loops:
-            yield loop.line()
-        if math.isfinite(self.softer) and self.stiffness > 0.0:
-            yield f"sticking, {100.0 * self.softer:.0f} % of the contact may be missing"
-        if self.cycle:
-            yield (
-                "sticking, the motion grows on"
-                if math.isinf(self.cycle.amplitude)
-                else f"sticking, it ends in a cycle of {1e6 * self.cycle.amplitude:.0f} µrad at "
-                f"{self.cycle.frequency:.0f} Hz"
-            )
+        if self.is_linear:
+            yield from self._poles()
         if self.linear_to < self.reach:
             least = f"up to {quantity(self.linear_to, 'rad')}" if self.linear_to > 0.0 else "in no motion"
             yield (
@@ -157,6 +159,22 @@ class ControllerStability:
                 f"(of motion up to {quantity(self.reach, 'rad')}) do not describe: simulate it (--confirm, `stickslip "
                 "rig run track`)"
             )
+
+    def _poles(self) -> Iterator[str]:
+        """Poles and margins of both loops, and where an unstable one ends."""
+        yield f"{'':<10}{'':<10}{'least stable pole':<22}{'torque times':>16}{'samples later':>16}"
+        for loop in self.loops:
+            yield loop.line()
+        if math.isfinite(self.softer) and self.stiffness > 0.0:
+            yield f"sticking, {100.0 * self.softer:.0f} % of the contact may be missing"
+        if found := self.told_cycle:
+            yield (
+                "sticking, the motion grows on"
+                if math.isinf(found.amplitude)
+                else f"sticking, it ends in a cycle of {1e6 * found.amplitude:.0f} µrad at {found.frequency:.0f} Hz"
+            )
+        elif self.cycle:
+            yield "sticking, the motion grows to where the controller is not linear: where it ends, no poles tell"
 
 
 def reach_of(amplitude: float, cycle: Cycle | None) -> float:
@@ -195,13 +213,19 @@ def controller_stability(axis: Axis, controller: Controller, delay: float = 0.0)
     estimator = controller.blocks["estimator"]
     late = estimator.law.delay(estimator.parameters, drive.sample_time) if estimator.law.delay else math.nan
     cycle = cycle_of(axis, controller, delay, sticking.poles)
-    ringing = sticking.poles.frequency if sticking.poles.frequency >= SLOW else axis.ringing
-    straight = linear_to(controller, reach_of(axis.amplitude, cycle), ringing)
+    sliding = margins("sliding", slid(axis), free)
+    straight = straight_to(axis, controller, reach_of(axis.amplitude, cycle), sticking.poles, sliding.poles)
     return ControllerStability(
         tuple(f"{part}: {block.law.name}" for part, block in controller.blocks.items()),
-        (sticking, margins("sliding", slid(axis), free)), axis.amplitude, drivetrain.visible, drive.sample_time, late,
+        (sticking, sliding), axis.amplitude, drivetrain.visible, drive.sample_time, late,
         softer, cycle, straight, frequency, -drive.response(frequency),
     )  # fmt: skip
+
+
+def straight_to(axis: Axis, controller: Controller, reach: float, *poles: Poles) -> float:
+    """The motion up to `reach` up to which the controller is linear at every frequency that these poles have, rad."""
+    every = {p.frequency if p.frequency >= SLOW else axis.ringing for p in poles}
+    return min(linear_to(controller, reach, frequency) for frequency in every)
 
 
 def slid(axis: Axis) -> Drivetrain:

@@ -50,7 +50,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--filter", action="append", type=float, default=[], metavar="HZ",
                         help="low-pass on the compensators' velocity; repeatable; 0: none (default 0, 10)")  # fmt: skip
     parser.add_argument("--amplitude", type=float, default=0.0, metavar="RAD",
-                        help="amplitude of the motion at the encoder (default one count)")  # fmt: skip
+                        help="amplitude of the motion at the encoder (default one count, or unrest)")  # fmt: skip
     parser.add_argument(
         "--confirm",
         action="store_true",
@@ -111,12 +111,16 @@ def composed(
     delay = plant.delay if args.delay is None else args.delay
     if args.confirm and args.delay is not None:
         raise InputError("--confirm runs the machine with its own delay; leave --delay out")
-    found = controller_stability(axis_of(plant, args.amplitude), controller, delay)
-    results: list[Any] = [found]
+    amplitude, tried = args.amplitude, None
     if args.confirm:
         from stickslip.study.controller_confirmed import confirmed_controller
 
-        results.append(confirmed_controller(plant, controller))
+        tried = confirmed_controller(plant, controller)
+        amplitude = (
+            amplitude or tried.amplitude
+        )  # what is said of poles is said of the motion that is confirmed
+    found = controller_stability(axis_of(plant, amplitude), controller, delay)
+    results: list[Any] = [found, tried] if tried else [found]
 
     def picture() -> Any:
         from stickslip.report.stability_pictures import picture_of_controller

@@ -12,9 +12,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from stickslip.analyse.controller_margins import about
+from stickslip.analyse.controller_margins import about, straight_to
 from stickslip.analyse.machine_axis import axis_of
 from stickslip.analyse.presliding_loop import Loop
+from stickslip.analyse.wording import quantity
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.machines.machine import Machine
@@ -39,6 +40,10 @@ class Scaled(Judged):
         infinite where the rig stopped it.
     calm : bool
         Whether that is rest.
+    linear_to : float
+        Motion up to which the controller is linear, rad: poles for a larger one are of another loop.
+    is_linear : bool
+        Whether it is over the motion that its poles are said of.
     """
 
     factor: float
@@ -46,6 +51,8 @@ class Scaled(Judged):
     frequency: float
     moved: float
     calm: bool
+    linear_to: float
+    is_linear: bool
 
 
 @dataclass(frozen=True)
@@ -57,31 +64,48 @@ class ConfirmedController:
     machine : str
     alone : float
         Motion of the machine without torque, rad.
+    amplitude : float
+        Of the motion that the poles are said of, rad: that from which a loop is restless.
     points : tuple of Scaled
     """
 
     machine: str
     alone: float
+    amplitude: float
     points: tuple[Scaled, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return {"machine": self.machine, "alone": self.alone, "points": [vars(p) for p in self.points]}
+        return {
+            "machine": self.machine,
+            "alone": self.alone,
+            "amplitude": self.amplitude,
+            "points": [vars(p) for p in self.points],
+        }
 
     def lines(self) -> Iterator[str]:
         """What people read."""
-        agreed = sum(p.agrees for p in self.points)
+        told = [p for p in self.points if p.is_linear]
+        agreed = sum(p.agrees for p in told)
         yield ""
         yield (
             f"on the virtual {self.machine}, pushed at rest; without torque it moves {1e6 * self.alone:.1f} µrad, from "
-            f"{RESTLESS:g} times that, or that many counts, a loop is restless:"
+            f"{RESTLESS:g} times that, or that many counts, a loop is restless; poles of motion of "
+            f"{quantity(self.amplitude, 'rad')}:"
         )
         yield f"{'loop times':>13}  {'poles':<10}{'rig':<10}{'motion left':>12}"
         for p in self.points:
             left = f"{1e6 * p.moved:.1f} µrad" if math.isfinite(p.moved) else "stopped"
             poles, rig = "stable" if p.stable else "unstable", "calm" if p.calm else "restless"
-            yield f"{p.factor:>13g}  {poles:<10}{rig:<10}{left:>12}{'' if p.agrees else '  (apart)'}"
-        yield f"{agreed} of {len(self.points)} loops do what the poles say"
+            apart = "  (apart)" if p.is_linear and not p.agrees else ""
+            yield f"{p.factor:>13g}  {poles if p.is_linear else 'none':<10}{rig:<10}{left:>12}{apart}"
+        if told:
+            yield f"{agreed} of {len(told)} loops do what the poles say"
+        if bent := [p.linear_to for p in self.points if not p.is_linear]:
+            yield (
+                f"{len(bent)} of {len(self.points)} loops have no poles for such motion: the controller is linear "
+                f"about rest only up to {quantity(min(bent), 'rad')}; the rig alone says what they do"
+            )
 
 
 def scaled(controller: Controller, factor: float) -> Controller | None:
@@ -117,14 +141,30 @@ def confirmed_controller(
     """
     limit = min(controller.torque_limit, VirtualRig(machine).limits.torque)
     alone = moved(machine, None)
-    count = 2.0 * math.pi / machine.encoder.counts if machine.encoder.counts > 0.0 else 0.0
-    most = RESTLESS * max(alone, count)
-    axis = axis_of(machine, math.sqrt(2.0) * most)
+    most = restless_from(machine, alone) / math.sqrt(2.0)
+    axis = axis_of(machine, restless_from(machine, alone))
     points: list[Scaled] = []
     for factor in factors:
         tried = controller if factor == 1.0 else scaled(controller, factor)
         if tried is not None:
             poles = Loop(*about(axis, tried, machine.delay, axis.amplitude)).poles()
             found = moved(machine, replace(tried, torque_limit=limit))
-            points.append(Scaled(factor, poles.growth, poles.frequency, found, found < most))
-    return ConfirmedController(machine.name, alone, tuple(points))
+            straight = straight_to(axis, tried, axis.amplitude, poles)
+            points.append(
+                Scaled(
+                    factor,
+                    poles.growth,
+                    poles.frequency,
+                    found,
+                    found < most,
+                    straight,
+                    straight >= axis.amplitude,
+                )
+            )
+    return ConfirmedController(machine.name, alone, axis.amplitude, tuple(points))
+
+
+def restless_from(machine: Machine, alone: float) -> float:
+    """Amplitude from which motion is unrest on a machine that moves so much without torque (RMS), rad."""
+    count = 2.0 * math.pi / machine.encoder.counts if machine.encoder.counts > 0.0 else 0.0
+    return math.sqrt(2.0) * RESTLESS * max(alone, count)
