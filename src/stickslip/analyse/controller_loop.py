@@ -45,14 +45,12 @@ SIZES = (1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 within 1e-6 rad a sample. What bends within the smallest one too is a sign for every drive."""
 BENT = 1e-4
 """Part by which answers to changes of other sizes may differ where a law is linear about rest."""
-
 DEAD = 1e-6
 """Part of its slope for larger changes below which a law does not answer smaller ones."""
 AGREES = 0.2
 """Part of the largest torque by which a motion's torque may differ from that of the matrices that stand for it."""
 FINER = math.sqrt(10.0)
 """Between the sizes of motions that are tried."""
-
 LONG = 200
 """Samples over which numbers are compared in size, and torques of a motion."""
 SPANNED = 1e-9
@@ -262,8 +260,8 @@ def _sizes(a: Array, b: Array) -> Array:
 def _krylov(a: Array, b: Array) -> Array:
     """An orthonormal base of what b, A b, A A b, ... span, shape (n, rank)."""
     base = np.zeros((len(a), 0))
-    v, size = b[:, 0], float(np.linalg.norm(b))
-    largest = float(np.linalg.norm(a))  # What A makes of a unit vector may be nothing but rounding.
+    # What A makes of a unit vector may be nothing but rounding.
+    v, size, largest = b[:, 0], float(np.linalg.norm(b)), float(np.linalg.norm(a))
     while base.shape[1] < len(a):
         for _ in range(2):  # once is not enough to full precision
             v = v - base @ (base.T @ v)
