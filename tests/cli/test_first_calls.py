@@ -93,12 +93,13 @@ def test_warm_up_runs_small_pieces_of_the_verbs(monkeypatch, capsys, tmp_path):
 
 
 def test_a_long_sweep_says_how_long_before_it_starts(monkeypatch, capsys):
-    monkeypatch.setattr("stickslip.sweep.forecast.seconds_of", lambda big: 36_000.0)
-    sweep.announce(SimpleNamespace(cases=20_000, device="cpu"), 2)
+    monkeypatch.setattr("stickslip.sweep.forecast.paces_of", lambda big: (1.0,))
+    monkeypatch.setattr("stickslip.sweep.forecast.seconds_of", lambda big, paces: 36_000.0)
+    sweep.announced(SimpleNamespace(cases=20_000, device="cpu", step=1e-4), 2)
     assert "20000 closed loops, about 5.0 h on 2 cores; --cases reduces the number" in capsys.readouterr().err
-    sweep.announce(SimpleNamespace(cases=20_000, device="gpu"), 2)
+    sweep.announced(SimpleNamespace(cases=20_000, device="gpu"), 2)
     assert "20000 closed loops; --cases reduces the number" in capsys.readouterr().err
-    sweep.announce(SimpleNamespace(cases=10, device="cpu"), 2)
+    sweep.announced(SimpleNamespace(cases=10, device="cpu"), 2)
     assert capsys.readouterr().err == ""
 
 
@@ -117,7 +118,8 @@ def test_its_time_is_that_of_cases_drawn_and_of_their_checks_not_of_the_nominal_
     monkeypatch.setattr(forecast, "integrator_of", lambda big, run: ("exact", ""))
     monkeypatch.setattr(forecast, "PATIENCE", 1e9)
     monkeypatch.setattr(forecast.time, "process_time", lambda: clock)
-    told = forecast.seconds_of(SimpleNamespace(runs=[1, 2], drawn=drawn))
+    big = SimpleNamespace(runs=[1, 2], drawn=drawn)
+    told = forecast.seconds_of(big, forecast.paces_of(big))
     assert told == pytest.approx(1000 * (0.9 * 3.0 + 0.1 * 30.0) * 3, rel=0.3)
     assert len(cases) == 2 * (1 + forecast.MOST_TIMED)
 

@@ -73,7 +73,7 @@ def test_the_simulation_runs_the_compensator_that_is_exported(kind, tmp_path):
     rows = [
         np.flatnonzero(record.time == 1e-3 * k)[-1] for k in range(600)
     ]  # as the controller has just acted
-    motion = reference.sample(1e-3 * np.arange(600) + 1e-11)
+    motion = reference.sample(1e-3 * np.arange(600))
     told = answers(
         built_controller(controller, CONTROL, tmp_path, COMPILERS[0]),
         record["position"][rows], *motion.T,

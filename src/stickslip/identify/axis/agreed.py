@@ -50,7 +50,6 @@ CONTRADICTS = 0.2
 """Part of the larger of two methods' numbers, by which they may differ where one is identified: the other is what four
 lines of least squares give."""
 DOUBT = "the prediction error, the only evidence for it, contradicts certain sliding on {name}: {other} against {own}"
-
 ONE_BAND = (
     "two methods are apart: the prediction error says {other.value:.4g}, certain sliding, of which one band of "
     "frequencies alone tells it, {own.value:.4g} {own.unit}"
@@ -138,7 +137,7 @@ def on_creep(found: Regression | None, axis: ServoAxis) -> list[str]:
     if found is None or found.creep.speed == 0.0:
         return []
     speed, missing = f"{found.creep.speed:.3g} {axis.unit('rad/s')}", f"{found.creep.missing:.0%}"
-    if found.creep.steady:
+    if found.creep.steady and not found.orders:
         return [
             f"Slower than {speed} {missing} of friction's level is missing although the axis slides steadily: friction "
             f"rises with velocity in another form than a level and a slope, which are those of faster motion alone."
@@ -293,7 +292,8 @@ def told_apart(estimates: Iterable[Estimate], found: Regression, model: Model) -
 
     def doubt_on(e: Estimate) -> str:
         name = e.name.removesuffix(NEGATIVE)
-        if found.creep.steady and name in ("fc", "sigma2"):
+        # Beside a torque over the position slow rows hold too few of its periods to say so.
+        if found.creep.steady and not found.orders and name in ("fc", "sigma2"):
             return OTHER_FORM
         alone = clear.get(name) and not found.confirmed(name)
         if alone and (name != "sigma2" or found.rough or high > ALONE * low):
