@@ -13,6 +13,7 @@ import numpy as np
 
 from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
 from stickslip.errors import InputError, suggestion, unwritable
+from stickslip.extras import needed
 from stickslip.values import same
 
 if TYPE_CHECKING:
@@ -135,10 +136,7 @@ class Record:
         InputError
             Without pandas, which `pip install 'stickslip[pandas]'` brings.
         """
-        try:
-            import pandas
-        except ModuleNotFoundError:
-            raise InputError("to_pandas() needs pandas; run `pip install 'stickslip[pandas]'`") from None
+        pandas = needed("pandas", "pandas", "to_pandas() needs")
         frame = pandas.DataFrame(dict(self.channels), index=pandas.Index(self.time, name="time"))
         frame.attrs.update(units=dict(self.units), meta=dict(self.meta))
         return frame

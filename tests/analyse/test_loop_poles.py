@@ -9,6 +9,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.analyse.controller_loop import linearised
+from stickslip.analyse.presliding_loop import Loop
+from stickslip.machines.drivetrain import Drivetrain
 
 INERTIA, VISCOUS, T = 4e-4, 0.01, 1e-3
 AXIS = ss.RigidAxis(INERTIA, ss.Model("coulomb", fc=0.2, sigma2=VISCOUS))
@@ -53,3 +55,14 @@ def test_a_controller_has_the_poles_that_its_torque_feels(
 ) -> None:
     a, _, _, _ = linearised(ss.Controller(gains, sample_time=T), math.inf, 10.0).state_space()
     assert np.sort(np.linalg.eigvals(a).real) == pytest.approx(poles, abs=1e-6)
+
+
+@pytest.mark.parametrize("damping", [0.2, 0.3, 0.5])
+def test_the_sensitivity_of_a_loop_that_is_sampled_often_is_the_textbooks(damping: float) -> None:
+    def peak(sample_time: float) -> float:
+        loop = ss.Controller(ss.place("PD", INERTIA, 15.0, damping), sample_time=sample_time)
+        return Loop(Drivetrain((INERTIA,)), linearised(loop, math.inf, 10.0)).sensitivity()
+
+    # Of s² / (s² + 2 D s + 1).
+    assert peak(1e-4) == pytest.approx(1.0 / (2.0 * damping * math.sqrt(1.0 - damping**2)), rel=0.02)
+    assert peak(0.05) == math.inf

@@ -21,7 +21,7 @@ from stickslip.recommend.candidates import Bench, Candidate, Setting, rings_alon
 from stickslip.recommend.notes import UNSURE, lag_of, notes_on, sampled_as
 from stickslip.recommend.refusals import held
 from stickslip.recommend.ringing import within_counts
-from stickslip.recommend.sampling import ROWS, sample_time_for, sensitivity
+from stickslip.recommend.sample_time import ROWS, sample_time_for
 
 INERTIA = 4e-4
 COULOMB = Model("coulomb", fc=0.05, sigma2=1e-3)
@@ -62,14 +62,6 @@ def test_a_loop_hardly_damped_at_its_records_rows_runs_faster_than_they_were_kep
     assert drive.sample_time_from.startswith(ROWS if kept else f"assumed: sampled every {period:.3g} s")
     asked = [note for note in sampled_as(drive, None) if note.startswith("A loop that is sampled more often")]
     assert len(asked) == kept
-
-
-@pytest.mark.parametrize("damping", [0.2, 0.3, 0.5])
-def test_the_sensitivity_of_a_loop_that_is_sampled_often_is_the_textbooks(damping: float) -> None:
-    fast = Drive(15.0, damping, 1e-4, amplitude=1.0).loop(INERTIA)
-    peak = 1.0 / (2.0 * damping * math.sqrt(1.0 - damping**2))  # Of s² / (s² + 2 D s + 1).
-    assert sensitivity(fast, INERTIA) == pytest.approx(peak, rel=0.02)
-    assert sensitivity(replace(fast, sample_time=0.05), INERTIA) == math.inf
 
 
 def test_a_loop_unstable_on_an_inertia_that_is_not_identified_asks_for_the_inertia() -> None:

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.extras import needed
 from stickslip.readers import _guard
-from stickslip.readers._extra import needed
 from stickslip.readers.table_columns import Column, Format, Table
 
 
@@ -24,7 +24,7 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """Every channel of numbers with its unit and the clock of its group."""
-    needed("asammdf", "mdf", "MDF files")
+    needed("asammdf", "mdf", "MDF files need")
     try:
         return _guard.call(_read_here, path, limit=_guard.patience(path))
     except _guard.Died as error:
@@ -32,7 +32,7 @@ def read(path: Path) -> Table:
 
 
 def _read_here(path: Path) -> Table:
-    library = needed("asammdf", "mdf", "MDF files")
+    library = needed("asammdf", "mdf", "MDF files need")
     columns: list[Column] = []
     try:
         with library.MDF(str(path)) as file:

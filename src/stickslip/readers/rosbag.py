@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.readers._extra import needed
+from stickslip.extras import needed
 from stickslip.readers.table_columns import Column, Format, Table
 
 MAX_ELEMENTS = 64
@@ -27,8 +27,8 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """The numeric fields of every topic, with their clock."""
-    library = needed("rosbags.highlevel", "rosbag", "ROS bags")
-    stores = needed("rosbags.typesys", "rosbag", "ROS bags")
+    library = needed("rosbags.highlevel", "rosbag", "ROS bags need")
+    stores = needed("rosbags.typesys", "rosbag", "ROS bags need")
     samples: dict[str, tuple[list[float], list[float]]] = {}
     try:
         store = stores.get_typestore(stores.Stores.LATEST)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.readers._extra import needed
+from stickslip.extras import needed
 from stickslip.readers.table_columns import Column, Format, Table
 
 
@@ -19,7 +19,7 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """Every channel of numbers, with its unit and, where it is a waveform, its clock."""
-    library = needed("nptdms", "tdms", "TDMS files")
+    library = needed("nptdms", "tdms", "TDMS files need")
     columns: list[Column] = []
     try:
         for group in library.TdmsFile.read(path).groups():

@@ -13,7 +13,7 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.recommend.candidate_run import Drive, Trial, run
 from stickslip.recommend.candidates import Bench, Candidate, resistance
-from stickslip.recommend.sampling import ROWS
+from stickslip.recommend.sample_time import ROWS
 
 MOSTLY = 0.5
 """Of the error: what a lag makes beyond that is most of it."""

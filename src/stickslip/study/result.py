@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip.errors import InputError
+from stickslip.extras import needed
 from stickslip.record import Record
 
 if TYPE_CHECKING:
@@ -112,10 +112,7 @@ class StudyResult:
         InputError
             Without pandas, which `pip install 'stickslip[pandas]'` brings.
         """
-        try:
-            import pandas
-        except ModuleNotFoundError:
-            raise InputError("to_pandas() needs pandas; run `pip install 'stickslip[pandas]'`") from None
+        pandas = needed("pandas", "pandas", "to_pandas() needs")
         names = ("slip_rule", "reference", "friction", "controller")
         return pandas.DataFrame(
             [

@@ -22,7 +22,7 @@ from stickslip.simulation.integrators import (
     reason,
 )
 from stickslip.simulation.machine.layout import TOLERANCE
-from stickslip.simulation.machine.loop import simulate_machine
+from stickslip.simulation.machine.loop import FINER, simulate_machine
 from stickslip.simulation.many import batch
 from stickslip.simulation.metrics import metrics as read_meter
 from stickslip.study.planned_run import PlannedRun
@@ -31,8 +31,6 @@ from stickslip.sweep.numbers import as_columns, varied
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LONGER = 2.0
 """Times the step of the fixed integrator, with which it runs again where wrong steps are asked for."""
-FINER = 0.01
-"""Times the tolerance of a machine's sub-steps, with which it runs again where wrong steps are asked for."""
 
 
 class Measured(NamedTuple):

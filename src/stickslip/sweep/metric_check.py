@@ -3,7 +3,7 @@
 What may be wrong depends on what ran the case. The exact integrator's steps are made wrong on purpose, the steps of the
 adaptive and the fixed one are made longer. A sampled loop is run at a hundredth of the tolerance, and that run is kept:
 one edge of an encoder, missed by an error of a step, turns the whole run into another one, and two loose runs that
-missed the same edge agree. A machine is run at a hundredth of the tolerance of its sub-steps, as
+missed the same edge agree. A machine is run at a thousandth of the tolerance of its sub-steps, as
 ``stickslip.simulate(..., check=True)`` does; its numbers stay those that `stickslip.simulate` gives.
 """
 

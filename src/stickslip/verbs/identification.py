@@ -16,6 +16,7 @@ from stickslip.approval import allow_code
 from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.config import Table
 from stickslip.errors import InputError
+from stickslip.extras import needed
 from stickslip.finding import Finding
 from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.identify.identified_file import Identified, identified_in
@@ -252,10 +253,7 @@ class IdentificationResult:
         InputError
             Without pandas, which `pip install 'stickslip[pandas]'` brings.
         """
-        try:
-            import pandas
-        except ModuleNotFoundError:
-            raise InputError("to_pandas() needs pandas; run `pip install 'stickslip[pandas]'`") from None
+        pandas = needed("pandas", "pandas", "to_pandas() needs")
         columns = ("value", "lower", "upper", "std", "unit", "identified", "verdict")
         rows = {e.name: [getattr(e, c) for c in columns] for e in self.identification.estimates}
         return pandas.DataFrame.from_dict(rows, orient="index", columns=list(columns))

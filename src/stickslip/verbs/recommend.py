@@ -24,7 +24,7 @@ from stickslip.machines.machine import Machine
 from stickslip.readers.reading import read
 from stickslip.recommend import recommend as setting
 from stickslip.recommend.candidate_run import Drive
-from stickslip.recommend.sampling import sample_time_for
+from stickslip.recommend.sample_time import sample_time_for
 from stickslip.verbs.compare import IdentifiedModel, identified_of
 from stickslip.verbs.reading import Log, open_log
 from stickslip.verbs.recommendation import RecommendationResult

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import replace
 
 from stickslip.analyse.controller_margins import ControllerStability, controller_stability
 from stickslip.analyse.machine_axis import axis_of
 from stickslip.arguments import arguments_checked
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
+from stickslip.control.own_loop import USUAL_TIME
 from stickslip.errors import InputError
-from stickslip.machines.contact import Contact
-from stickslip.machines.encoder import Encoder
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
+from stickslip.recommend.plant import Plant
 
 
 @arguments_checked
@@ -65,12 +64,10 @@ def stability(
         if isinstance(controller, Controller)
         else read_controller(controller, at_hand.inertia, models)
     )
-    plant = at_hand if isinstance(at_hand, Machine) else rigid(at_hand, held)
+    plant = at_hand
+    if isinstance(plant, RigidAxis):
+        plant = Plant(plant.inertia, plant.friction).built(
+            held.sample_time or USUAL_TIME, held.encoder_counts
+        )
     late = plant.delay if delay is None else delay
     return controller_stability(axis_of(plant, amplitude or 0.0), held, late)
-
-
-def rigid(axis: RigidAxis, controller: Controller) -> Machine:
-    """A rigid axis as a machine without imperfections, measured as the controller measures it."""
-    made = Machine("axis", axis.inertia, Contact(axis.friction), encoder=Encoder(controller.encoder_counts))
-    return replace(made, sample_time=controller.sample_time) if controller.sample_time > 0.0 else made

@@ -14,6 +14,7 @@ import numpy as np
 from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.capacity import insist_on_jobs
 from stickslip.errors import InputError
+from stickslip.extras import needed
 from stickslip.identify.estimate import silent
 from stickslip.sweep import dataset, execute
 from stickslip.sweep.gains import too_few
@@ -80,10 +81,7 @@ class SweepResult:
         InputError
             Without pandas, which `pip install 'stickslip[pandas]'` brings.
         """
-        try:
-            import pandas
-        except ModuleNotFoundError:
-            raise InputError("to_pandas() needs pandas; run `pip install 'stickslip[pandas]'`") from None
+        pandas = needed("pandas", "pandas", "to_pandas() needs")
         return pandas.DataFrame([dict(row) for row in self.rows])
 
     def __repr__(self) -> str:

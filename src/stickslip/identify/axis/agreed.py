@@ -137,7 +137,7 @@ def on_creep(found: Regression | None, axis: ServoAxis) -> list[str]:
     if found is None or found.creep.speed == 0.0:
         return []
     speed, missing = f"{found.creep.speed:.3g} {axis.unit('rad/s')}", f"{found.creep.missing:.0%}"
-    if found.creep.steady and not found.orders:
+    if found.creep.steady:
         return [
             f"Slower than {speed} {missing} of friction's level is missing although the axis slides steadily: friction "
             f"rises with velocity in another form than a level and a slope, which are those of faster motion alone."
@@ -292,8 +292,7 @@ def told_apart(estimates: Iterable[Estimate], found: Regression, model: Model) -
 
     def doubt_on(e: Estimate) -> str:
         name = e.name.removesuffix(NEGATIVE)
-        # Beside a torque over the position slow rows hold too few of its periods to say so.
-        if found.creep.steady and not found.orders and name in ("fc", "sigma2"):
+        if found.creep.steady and name in ("fc", "sigma2"):
             return OTHER_FORM
         alone = clear.get(name) and not found.confirmed(name)
         if alone and (name != "sigma2" or found.rough or high > ALONE * low):

@@ -206,17 +206,21 @@ def in_bands(
             if not bands:
                 known = options["skew"]
                 start = clear_skew(signals, factor * width) if known is None else known
-                far = math.inf if axis.gravity == "pendulum" else FAR[axis.motion]
-                widest, falls, creep = rows_of(signals, factor * width, start, exponents, far)
+                widest, falls, creep, steady = rows_of(
+                    signals, factor * width, start, exponents, FAR[axis.motion]
+                )
                 own = {**options, "start": start}
                 chosen = {
                     "start": start,
                     **(orders_in(widest, falls, axis, period, own) if harmonics else {}),
                 }
+                # A weight, and other torques over the position, are not in what slow rows are held against.
+                if steady is not NOWHERE and axis.gravity != "pendulum" and not chosen.get("orders"):
+                    creep = steady
                 rows = widest
             else:
                 skew = bands[0].numbers["skew"].value
-                rows, falls, _ = rows_of(signals, factor * width, skew, exponents)
+                rows, falls, *_ = rows_of(signals, factor * width, skew, exponents, math.inf)
             bands.append(fit_band(rows, falls, **{**options, **chosen}))
         except InputError as error:
             lacking = error
@@ -299,10 +303,10 @@ def misfits(rows: Sequence[SlidingRows], shifts: Whole) -> Array:
 
 
 def rows_of(
-    signals: Sequence[Signals], width: float, skew: float, exponents: Sequence[float], far: float = math.inf
-) -> tuple[list[SlidingRows], list[Fall], Creep]:
+    signals: Sequence[Signals], width: float, skew: float, exponents: Sequence[float], far: float
+) -> tuple[list[SlidingRows], list[Fall], Creep, Creep]:
     """Rows seen through one window, without those where friction is still being rebuilt or the axis creeps with too
-    little of it; the falls tried; and that creeping, or what friction lacks `far` behind a reversal, rad (m)."""
+    little of it; the falls tried; that creeping; and what friction lacks `far` behind a reversal, rad (m)."""
     windows = [Window(width, s.period) for s in signals]
     first = [sliding_rows(s, w) for s, w in zip(signals, windows, strict=True)]
     speed = np.abs(stacked(first, "speed"))
@@ -318,8 +322,7 @@ def rows_of(
     faster = [r for r in (r.faster(creep.speed) for r in rows) if r.time.size >= FEWEST]
     if not faster or creep is NOWHERE:
         faster, creep = rows, NOWHERE
-    steady = steady_lack(first, faster, skew, far)
-    return faster, falls, creep if steady is NOWHERE else steady
+    return faster, falls, creep, steady_lack(first, faster, skew, far)
 
 
 # ---- what the bands say together ------------------------------------------------------------

@@ -227,17 +227,9 @@ def commanded(lin: Linear, loop: Loop, h: float) -> tuple[float, float, float, f
     if h < SHORT or size > STEEPEST:
         off = segment.command_mid - 0.5 * (now.command + segment.command_end)
         # Lifted, the parabola has no impulse left: damping brings little of it back, the motion inside sees it pass.
-        bent = ONE_SIDED * abs(r3) * h * h * h + abs(off) * (
-            PASSING + min(h * lin.damping / lin.inertia, 1.0)
-        )
-        return (
-            (segment.command_end - now.command) * inverse,
-            0.0,
-            0.0,
-            abs(misfit) + bent,
-            PARABOLA * off,
-            0.0,
-        )
+        share = PASSING + min(h * lin.damping / lin.inertia, 1.0)
+        misfit = abs(misfit) + ONE_SIDED * abs(r3) * h * h * h + share * abs(off)
+        return (segment.command_end - now.command) * inverse, 0.0, 0.0, misfit, PARABOLA * off, 0.0
     return r1, r2, r3, misfit, BUMP * misfit, 1.0
 
 

@@ -40,6 +40,7 @@ from stickslip.simulation.machine.series import (
 from stickslip.simulation.machine.substep import GROWS, act, least_level, rolled
 from stickslip.simulation.root import MOST, ROOT
 from stickslip.simulation.root import compiled as root
+from stickslip.simulation.train.cross import SLIVER, snapped
 
 DEEPEST = 24
 """Halvings of a sample that a step may need."""
@@ -47,10 +48,6 @@ LOOKS = 2
 """Halvings beyond those that resolve every mode, from which nodes show all that there is."""
 MARGIN = 0.05
 """Of the range of what nodes show, by which it may pass them between."""
-SLIVER = 0.2
-"""Of a step: less than that up to its place on the sample is taken together with it."""
-SNAP = 1e-13
-"""Of a sample: a step that ends so near to its half, quarter, ... ends there."""
 STORM = 10000
 """Steps in a sample, after which the motion is no number."""
 BARELY = 1e-30
@@ -73,23 +70,13 @@ def cross(plant: Plant, before: float, drive: float, late: int, factor: float) -
         end = part if early else 1.0
         length = step(plant, place, end, factor)
         energy += now.friction * plant.axis[n.disk + 1] * length
-        place = snapped(place + length, end)
+        place = snapped(place + length, FINEST, end)
         steps += 1
         if steps > STORM or not math.isfinite(plant.axis[n.disk + 1]):
             plant.axis[n.disk] = math.nan
             break
     now.taken += steps
     return energy
-
-
-@kernel(inline=True)
-def snapped(place: float, end: float) -> float:
-    """A part of the sample, or the end of a step that it lies beside by rounding."""
-    parts = float(1 << FINEST)
-    whole = math.floor(place * parts + 0.5) / parts
-    if abs(place - whole) < SNAP:
-        place = whole
-    return end if end - place < SNAP else place
 
 
 @kernel(inline=True)

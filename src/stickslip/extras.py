@@ -1,4 +1,4 @@
-"""Libraries that only some formats need."""
+"""Libraries that only some functions and formats need, which extras of the package bring."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from stickslip.errors import InputError
 
 
 def needed(module: str, extra: str, what: str) -> Any:
-    """The module, imported now.
+    """The module, imported now; `what` is who needs it, with the verb: "MDF files need".
 
     Raises
     ------
@@ -19,6 +19,4 @@ def needed(module: str, extra: str, what: str) -> Any:
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError:
-        raise InputError(
-            f"{what} need {module.split('.')[0]}; run `pip install 'stickslip[{extra}]'`"
-        ) from None
+        raise InputError(f"{what} {module.split('.')[0]}; run `pip install 'stickslip[{extra}]'`") from None

@@ -9,21 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
-
-import numpy as np
 
 from stickslip.analyse.controller_loop import linearised
-from stickslip.control.controller import Controller
+from stickslip.analyse.presliding_loop import Loop
 from stickslip.control.own_loop import USUAL_TIME
 from stickslip.identify.identified_file import Identified
+from stickslip.machines.drivetrain import Drivetrain
 from stickslip.machines.machine import Machine
 from stickslip.recommend.candidate_run import Drive
 
 WELL_DAMPED = 2.0
 """Greatest sensitivity of loops as people set them: 1.2 to 2 (Åström and Hägglund, Advanced PID Control, 2006)."""
-POINTS = 500
-"""Frequencies up to half the sample rate, over five decades."""
 MIDDLE = 10.0
 """Hz; a linear loop is the same at every frequency."""
 
@@ -60,38 +56,9 @@ def sample_time_for(
     if period > USUAL_TIME and inertia:
         # Gains do not depend on it, and a bandwidth that is too high for it is no error yet.
         loop = replace(sampled(USUAL_TIME).loop(inertia), sample_time=period)
-        if not sensitivity(loop, inertia) <= WELL_DAMPED:
+        if not Loop(Drivetrain((inertia,)), linearised(loop, math.inf, MIDDLE)).sensitivity() <= WELL_DAMPED:
             return USUAL_TIME, (
                 f"assumed: sampled every {period:.3g} s, as {record} has rows, this loop would be unstable or hardly "
                 f"damped, so that it is taken to run faster than the record was kept; {OWN}"
             )
     return period, f"{ROWS} {record}; {OWN}"
-
-
-def sensitivity(loop: Controller, inertia: float) -> float:
-    """Greatest magnitude of 1 / (1 + L) of a sampled loop on a rigid axis; infinite where it is unstable.
-
-    Parameters
-    ----------
-    loop : Controller
-        Linear, and sampled.
-    inertia : float
-        kg·m² (kg); the axis is that alone, with the torque held over a sample.
-
-    Raises
-    ------
-    InputError
-        If a law of the loop is not smooth about rest.
-    """
-    linear, t = linearised(loop, math.inf, MIDDLE), loop.sample_time
-    a, b, c, d = (np.asarray(x, dtype=float) for x in linear.state_space())
-    b, c = b.reshape(-1, 1), c.reshape(1, -1)
-    free: Any = np.array([[1.0, t], [0.0, 1.0]])
-    pushed, seen = np.array([[0.5 * t * t], [t]]) / inertia, np.array([[1.0, 0.0]])
-    closed = np.block([[free + float(d) * pushed @ seen, pushed @ c], [b @ seen, a]])
-    if np.abs(np.linalg.eigvals(closed)).max() > 1.0 + 1e-9:
-        return math.inf
-    angle = np.geomspace(1e-5 * math.pi, math.pi, POINTS)
-    z = np.exp(1j * angle)
-    axis = 0.5 * t * t / inertia * (z + 1.0) / (z - 1.0) ** 2
-    return float(np.abs(1.0 / (1.0 - axis * linear.response(angle / (2.0 * math.pi * t)))).max())
