@@ -201,7 +201,9 @@ class Exported:
             "{ return axis_sample(y, r, v, a, &n, &m, &z, &p, &u); }\n"
         )  # fmt: skip
         library = folder / "axis.so"
-        command = [*"gcc -std=c99 -O2 -shared -fPIC axis.c glue.c -o".split(), str(library), "-lm"]
+        command = [
+            "gcc", "-std=c99", "-O2", "-shared", "-fPIC", "axis.c", "glue.c", "-o", str(library), "-lm",
+        ]  # fmt: skip
         subprocess.run(command, cwd=folder, check=True, capture_output=True)
         self.library = ctypes.CDLL(str(library))
         self.begin = self.library.begin
