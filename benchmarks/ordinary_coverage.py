@@ -86,11 +86,13 @@ def study(task: tuple[tuple[int, str, int, str, str, str], str, bool, float]) ->
     try:
         if plain:
             found = regress_axis([experiment], AXIS)
-            told = {n: (*v, n != "offset" and v[2] <= 2.0 * v[1]) for n, v in sliding_values(found).items()}
+            told = {
+                n: (*v, n != "offset" and v[2] <= 2.0 * v[1]) for n, v in sliding_values(found, None).items()
+            }
             level = found.numbers["fc"].value
             told = {n: (*v[:3], v[3] and not (found.doubt or (n == "fc" and found.level_doubt)))
                     for n, v in told.items()}  # fmt: skip
-            value, low, high = sliding_values(found)["offset"]
+            value, low, high = sliding_values(found, None)["offset"]
             told["offset"] = (value, low, high, 0.5 * (high - low) <= 0.1 * level)
         else:
             result = identify_axis([experiment], AXIS, [law] if law else ("coulomb", "stribeck", "lugre"))

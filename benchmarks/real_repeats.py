@@ -170,7 +170,7 @@ def identified(task: tuple[str, ServoAxis, list[Experiment], int, bool]) -> Part
     try:
         if sliding_alone:
             regression = regress_axis([experiment], axis)
-            found = sliding_values(regression)
+            found = sliding_values(regression, None)
             level = abs(found["fc"][0])
             for n in NAMES.keys() & found.keys():
                 value, low, high = found[n]

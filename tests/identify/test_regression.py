@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.identify.axis.agreed import agreed, aligned, as_good, on_width
+from stickslip.identify.axis.agreed import agreed, aligned, as_good
 from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.axis.in_sentences import on_width
 from stickslip.identify.axis.plain import inverse_identification
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment

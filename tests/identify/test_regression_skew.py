@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.identify.axis.agreed import aligned, on_timing
+from stickslip.identify.axis.agreed import aligned
+from stickslip.identify.axis.in_sentences import on_timing
 from stickslip.identify.doctor import examine
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.number import Number

@@ -85,8 +85,8 @@ def seen_rows(drive: np.ndarray, width: float) -> SlidingRows:
     signals = Signals(time, none, drive, 0.0, np.ones(drive.size, dtype=np.bool_), 0.0, 0.0)
     places = np.arange(100, drive.size - 100, 10)
     speed = np.zeros(places.size)
-    return SlidingRows(time[places], none, speed, none, none, none, places, signals, Window(width, ROW), places, none,
-                       none)  # fmt: skip
+    return SlidingRows(time[places], none, speed, none, none, none, none, places, signals, Window(width, ROW), places,
+                       none, none)  # fmt: skip
 
 
 @pytest.mark.parametrize(("held", "skew"), [(True, -0.5 * ROW), (False, 0.5 * ROW)])

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from stickslip.identify.axis.agreed import on_creep
+from stickslip.identify.axis.in_sentences import on_creep
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.creeping import NOWHERE
 from stickslip.identify.regression.number import Number

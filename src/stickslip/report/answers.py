@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.axis.agreed import on_timing
 from stickslip.identify.axis.falling import missing_fall
+from stickslip.identify.axis.in_sentences import on_timing
 from stickslip.identify.axis.loop_check import OTHER_LOOP
 from stickslip.identify.axis.problem import mechanics_parameters
 from stickslip.identify.estimate import Estimate, Identification

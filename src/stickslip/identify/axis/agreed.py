@@ -32,6 +32,7 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.uncertainty import RATIO
+from stickslip.identify.regression.bent import bend_told
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import QUANTILE, Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
@@ -58,6 +59,10 @@ BAND_ALONE = (
     "one band of frequencies alone tells it, where level and slope, or motor and load, are not told apart"
 )
 OTHER_FORM = "slower steady motion has another friction than this level and slope"
+BENT = (
+    "friction rises ever {how} with velocity: over the recorded speeds its curve is {share:.0%} of Fc off any "
+    "level, slope and fall"
+)
 LEVELS = ("fc", "sigma2", *FALL)
 """What sliding alone tells of friction; that of v < 0 too where it has parameters of its own."""
 UNSEEN = (
@@ -97,55 +102,6 @@ def aligned(experiments: Sequence[Experiment], found: Regression | None) -> list
             continue
         out.append(replace(t, drive=np.interp(t.time + late, t.time, t.drive)))
     return out
-
-
-def on_timing(found: Regression | None) -> list[str]:
-    """When the torque acted, in a sentence; nothing where the record does not tell."""
-    if found is None:
-        return []
-    low, high = found.interval("skew")
-    half, row = 0.5 * (high - low), found.period
-    if half > KNOWN * row or not found.shows_inertia:
-        return []
-    value = found.numbers["skew"].value
-    where = "after" if value < 0.0 else "before"
-    share = -value / row
-    kind = (
-        "as a command held from row to row" if abs(share - 0.5) <= max(ALIGNED, half / row)
-        else "as a value sampled at the row" if abs(share) <= max(ALIGNED, half / row)
-        else "as a mean over the row before" if abs(share + 0.5) <= max(ALIGNED, half / row)
-        else "a hold and a delay together"
-    )  # fmt: skip
-    return [
-        f"The torque acted {1e3 * abs(value):.3g} ms (±{1e3 * half:.2g}) {where} its row on average, {abs(share):.2g} "
-        f"of a row: {kind}; this is allowed for."
-    ]
-
-
-def on_width(found: Regression | None) -> list[str]:
-    """That motor and load do not move as one in the shortest windows, in a sentence; nothing where they do."""
-    if found is None or found.widened == 1.0:
-        return []
-    return [
-        f"Faster than {found.bands[0].corner:.2g} Hz the axis does not move as one inertia (play that opens while it "
-        f"slides, a train that rings): inertia and friction are those of slower motion."
-    ]
-
-
-def on_creep(found: Regression | None, axis: ServoAxis) -> list[str]:
-    """That friction is missing where the axis creeps, in a sentence; nothing where it is not."""
-    if found is None or found.creep.speed == 0.0:
-        return []
-    speed, missing = f"{found.creep.speed:.3g} {axis.unit('rad/s')}", f"{found.creep.missing:.0%}"
-    if found.creep.steady:
-        return [
-            f"Slower than {speed} {missing} of friction's level is missing although the axis slides steadily: friction "
-            f"rises with velocity in another form than a level and a slope, which are those of faster motion alone."
-        ]
-    return [
-        f"Slower than {speed} {missing} of friction's level is missing (a motor that goes on alone within the play, or "
-        f"friction that builds up with velocity): inertia and friction are those of faster motion."
-    ]
 
 
 # ---- numbers --------------------------------------------------------------------------------------------------
@@ -281,10 +237,12 @@ def told_apart(estimates: Iterable[Estimate], found: Regression, model: Model) -
 
     One band of frequencies alone tells inertia or level (on tuning steps 8 of 19 such levels held, 17 of 26 inertias),
     or the slope where motor and load move apart; the level is extrapolated, or its value had to be moved far towards
-    another method's. A law that means others by these names has its friction from the prediction error.
+    another method's; or friction rises with velocity in another form. A law that means others by these names has its
+    friction from the prediction error.
     """
     of_law = told_with(model, found)
     (low, high), own = found.interval("fc"), found.numbers["fc"].value
+    bend = bend_told({b.corner: b.bend for b in found.bands})
     # What sliding hardly tells is the prediction error's.
     clear = {
         "inertia": True, "fc": of_law and high <= RATIO * low, "sigma2": of_law and found.slope_told,
@@ -294,6 +252,8 @@ def told_apart(estimates: Iterable[Estimate], found: Regression, model: Model) -
         name = e.name.removesuffix(NEGATIVE)
         if found.creep.steady and name in ("fc", "sigma2"):
             return OTHER_FORM
+        if bend and of_law and name in LEVELS:
+            return BENT.format(how="faster" if bend > 0.0 else "more slowly", share=min(abs(bend), 1.0))
         alone = clear.get(name) and not found.confirmed(name)
         if alone and (name != "sigma2" or found.rough or high > ALONE * low):
             return BAND_ALONE

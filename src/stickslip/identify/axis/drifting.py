@@ -9,11 +9,11 @@ import numpy as np
 
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.smooth import Window, seen
-from stickslip.identify.regression.bands import together
 from stickslip.identify.regression.drifting import DRIFTS, drift_of, length_of
 from stickslip.identify.regression.number import QUANTILE
 from stickslip.identify.regression.regression import Regression
 from stickslip.identify.regression.sliding_rows import direction_in, fine_window, signals_of
+from stickslip.identify.regression.together import together
 from stickslip.machines.servo import ServoAxis
 
 CLOSE = 0.999

@@ -16,13 +16,7 @@ from typing import Any
 
 from stickslip import plugins
 from stickslip.errors import InputError, UnknownName
-from stickslip.identify.axis.agreed import (
-    aligned,
-    on_creep,
-    on_timing,
-    on_width,
-    regressed,
-)
+from stickslip.identify.axis.agreed import aligned, regressed
 from stickslip.identify.axis.choice import (
     Candidate,
     asked_of,
@@ -36,6 +30,7 @@ from stickslip.identify.axis.choice import (
 from stickslip.identify.axis.drifting import at_the_middle, on_drift
 from stickslip.identify.axis.exponent import is_open, shown
 from stickslip.identify.axis.form import TOLD_BY_SLIDING
+from stickslip.identify.axis.in_sentences import on_bend, on_creep, on_timing, on_width
 from stickslip.identify.axis.law_fit import Evidence, against_sliding, estimated
 from stickslip.identify.axis.output import judged
 from stickslip.identify.axis.result import assembled, narrow_note, noted
@@ -266,6 +261,7 @@ def looked_at(
         *(on_timing(sliding) if skew is None else []),
         *on_width(sliding),
         *on_creep(sliding, axis),
+        *on_bend(sliding),
         *on_drift(sliding),
         *notes,
         *more,

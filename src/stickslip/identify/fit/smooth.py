@@ -56,8 +56,8 @@ class Window:
     def weights(self, derivative: int = 0, late: float = 0.0) -> Array:
         """What each row within reach counts, shape (2 reach + 1 or more,): sum(w x) is the derivative at the middle.
 
-        Exact for a constant, and for the power of the derivative's order. With `late` the window lies so many seconds
-        behind the row (derivative 0).
+        Exact for a constant, and for the power of the derivative's order (4 at most). With `late` the window lies so
+        many seconds behind the row (derivative 0).
         """
         reach = self.reach + math.ceil(abs(late) / self.period)
         t = np.arange(-reach, reach + 1) * self.period - late
@@ -72,9 +72,14 @@ class Window:
             w = (x * x - 1.0) * bell
             w -= bell * w.sum()
             return w / (w @ (0.5 * t * t))
-        w = (x**3 - 3.0 * x) * bell
-        w -= self.weights(1) * (w @ t)
-        return w / (w @ (t**3 / 6.0))
+        if derivative == 3:
+            w = (x**3 - 3.0 * x) * bell
+            w -= self.weights(1) * (w @ t)
+            return w / (w @ (t**3 / 6.0))
+        w = (x**4 - 6.0 * x * x + 3.0) * bell
+        w -= self.weights(2) * (w @ (0.5 * t * t))
+        w -= bell * w.sum()
+        return w / (w @ (t**4 / 24.0))
 
     def noise(self, derivative: int) -> float:
         """Standard deviation of the derivative where the rows have independent noise of standard deviation 1."""

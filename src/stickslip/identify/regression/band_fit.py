@@ -26,7 +26,9 @@ from stickslip.identify.regression.band_system import (
     Candidate,
     System,
 )
+from stickslip.identify.regression.bent import bent_in, explains
 from stickslip.identify.regression.drifting import drift_rows
+from stickslip.identify.regression.flexible import Train
 from stickslip.identify.regression.number import Number
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import memory_of
@@ -77,6 +79,10 @@ class BandFit:
     relative : float
         The same over the RMS of the torque.
     rows, pieces : int
+    swing : float
+        Coefficient of the torque's second derivative where a load swings, s²; else 0.
+    bend : float
+        Part of Fc by which friction rises with velocity in another form (`stickslip.identify.regression.bent`).
     """
 
     corner: float
@@ -90,12 +96,15 @@ class BandFit:
     relative: float
     rows: int
     pieces: int
+    swing: float
+    bend: float
 
 
 def fit_band(
     records: Sequence[SlidingRows], tried: Sequence[Fall], *, orders: Sequence[float] = (),
     background: Sequence[float] = (), pendulum: bool = False, skew_size: float = 3e-3, skew: float | None = None,
     start: float = 0.0, blurred: bool = False, each_way: bool = False, drifting: bool = False,
+    train: Train = Train.RIGID,
 ) -> BandFit:  # fmt: skip
     """Fit the rows of certain sliding that one window shows.
 
@@ -121,8 +130,10 @@ def fit_band(
         Whether friction has a level and a slope of its own in each direction.
     drifting : bool
         Whether level and slope of friction may change evenly with time.
+    train : Train
+        What moves.
     """
-    system = System(records, tried, orders, background, pendulum, skew_size, each_way, drifting)
+    system = System(records, tried, orders, background, pendulum, skew_size, each_way, drifting, train)
     at = start if skew is None else skew
     system.expected = at
     torque = system.torque(at)
@@ -261,6 +272,11 @@ def summed_up(
     harmonics = np.array([sum(w * v[i] for (w, _), v in zip(kept, values, strict=True)) / total
                           for i in range(first, core)]).reshape(orders, 2)  # fmt: skip
     misfit = float(np.sqrt(np.mean(residual**2)))
+    bend, bent = bent_in(system, candidates, weight)
+    if bent is not None and explains(system, bent, best):
+        # What friction rises by, of another form, would pass for inertia where the axis accelerates at speed.
+        variance = system.covariance(torque, bent)[INERTIA, INERTIA]
+        numbers["inertia"] = Number(float(bent.values[INERTIA] / system.scale[INERTIA]), math.sqrt(variance))
     rows = np.array(list(named.values()))
     joint = rows @ system.covariance(torque, best)[:core, :core] @ rows.T
     # Of a motion that tells two columns hardly apart, rounding leaves a variance below 0: related to nothing then.
@@ -271,4 +287,5 @@ def summed_up(
         system.records[0].window.corner, numbers, float(falls / total), weight,
         tuple(tried[k] for k in system.levels), harmonics, correlation, misfit,
         misfit / max(float(np.sqrt(np.mean(torque**2))), 1e-300), torque.size, int(system.piece[-1]) + 1,
+        system.swing_of(best), bend,
     )  # fmt: skip

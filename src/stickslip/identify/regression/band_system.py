@@ -1,8 +1,8 @@
 """The columns of the regression in one band of frequencies, and its solution for every fall of friction.
 
 Friction that no law holds (a curve a little other than assumed, memory after a reversal, friction that lags behind
-velocity, a torque over the position) takes part as columns whose coefficients are small, and what they could do to a
-number is in its variance; so is a misfit that does not average out.
+velocity, a torque over the position) and a train that is not stiff take part as columns whose coefficients are small,
+and what they could do to a number is in its variance; so is a misfit that does not average out.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.regression.drifting import MAY_DRIFT, drift_columns, drift_unseen
+from stickslip.identify.regression.flexible import Train, flexible_columns
 from stickslip.identify.regression.rounding import rounded_sums
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
@@ -173,8 +174,10 @@ class System:
     def __init__(
         self, records: Sequence[SlidingRows], falls: Sequence[Fall], orders: Sequence[float], background:
         Sequence[float], pendulum: bool, skew_size: float, each_way: bool = False, drifting: bool = False,
+        train: Train = Train.RIGID,
     ):  # fmt: skip
         self.records, self.skew_size, self.expected = records, skew_size, 0.0
+        self.train = train
         self.stroke = strokes_of(records)
         self.shortest = rows_in(PIECE, records)
         core = [stacked(records, "fixed"), stacked(records, "jerk")[:, None]]
@@ -207,7 +210,9 @@ class System:
         beyond = np.maximum(speed / max(USUAL * often, 1e-300), 1.0)
         before = beyond**-2.0 * np.array([USUAL_EXPONENTS[falls[k].exponent] for k in self.levels])
         self.before = before / max(float(np.sum(before)), 1e-300)
-        small, self.std = small_columns(records, self.fc, background, each_way, drifting)
+        flexible, give = flexible_columns(records, self.inertia, train)
+        small, std = small_columns(records, self.fc, background, each_way, drifting)
+        small, self.std = np.column_stack([flexible, small]), np.concatenate([give, std])
         columns = np.column_stack([plain, falling[:, self.levels], small])
         scale = np.linalg.norm(columns, axis=0)
         # A wave that the window damps away is 0: the square of what is left of it would be.
@@ -300,6 +305,12 @@ class System:
         for k, c in enumerate(candidates):
             coefficients[c.columns, k], coefficients[self.small, k] = c.values, c.small
         return torque[:, None] - self.columns @ coefficients
+
+    def swing_of(self, c: Candidate) -> float:
+        """Coefficient of the torque's second derivative in a candidate, s²; 0 where no load swings."""
+        if self.train is not Train.SWINGS:
+            return 0.0
+        return float(c.small[Train.GIVES.value] / self.scale[self.small[Train.GIVES.value]])
 
     def weights(self, candidates: Sequence[Candidate]) -> Array:
         """Probability of every candidate after the record."""

@@ -7,9 +7,9 @@ the motor slides, a train that rings), the narrowest in which they do.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,12 +19,13 @@ from stickslip.identify.fit.smooth import Window, seen
 from stickslip.identify.regression.band_fit import BandFit, fit_band
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.creeping import FAR, NOWHERE, Creep, creep_of, steady_lack
-from stickslip.identify.regression.drifting import DRIFTS
+from stickslip.identify.regression.flexible import GIVES, SWINGS, Train, swings_alike
 from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.orders import candidate_orders, goes_round, shown_orders
 from stickslip.identify.regression.rebuilding import rebuilding_way
 from stickslip.identify.regression.sliding_rows import FEWEST, Fall, Signals, SlidingRows, sliding_rows
 from stickslip.identify.regression.strokes import stacked
+from stickslip.identify.regression.together import telling, together
 from stickslip.machines.servo import ServoAxis
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -56,17 +57,8 @@ CURVE = 3
 """Every so many of the falls tried make up friction's curve where orders are looked for."""
 BACKGROUND = 12
 """Lowest orders of a torque over the position that is small, but may be there."""
-TELLING, NARROW = 4.0, 0.1
-"""A band tells of a number where its standard deviation is at most so many times the smallest, or that part of the
-value."""
-FINEST = 0.01
-"""Rows: standard deviation of a skew that is found, at least: a hold, a lag and a mean are a delay to that only."""
-FORM = 0.012
-"""Part of Fc, one standard deviation, that its level is unsure by where the slope beside it is not told: of 103 levels
-on tuning steps 89 % held without it."""
 WEIGHT = (0.5 / math.pi,)
 """Cycles a radian of a pendulum's weight."""
-ROTATED = {"gravity_sin", "gravity_cos"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +79,8 @@ class Bands:
         Up to which speed friction is missing in the widest, so that slower rows are left out.
     perhaps : tuple of BandFit
         The fits beside a drift of friction that may be there, but is not told.
+    train : Train
+        What is taken to move.
     """
 
     fits: tuple[BandFit, ...]
@@ -95,6 +89,7 @@ class Bands:
     widened: float = 1.0
     creep: Creep = NOWHERE
     perhaps: tuple[BandFit, ...] = ()
+    train: Train = Train.RIGID
 
     @property
     def drifts(self) -> bool:
@@ -197,36 +192,64 @@ def in_bands(
 ) -> Bands:  # fmt: skip
     """Fits from the widest band of frequencies to the narrowest, friction falling with one of these exponents."""
     bands: list[BandFit] = []
-    widest: list[SlidingRows] = []
-    chosen: dict[str, Any] = {}
-    creep = NOWHERE
+    first: Widest | None = None
     lacking = InputError("no band of the record slides long enough in one direction")
     for factor in BANDS:
         try:
-            if not bands:
-                known = options["skew"]
-                start = clear_skew(signals, factor * width) if known is None else known
-                widest, falls, creep, steady = rows_of(
-                    signals, factor * width, start, exponents, FAR[axis.motion]
-                )
-                own = {**options, "start": start}
-                chosen = {
-                    "start": start,
-                    **(orders_in(widest, falls, axis, period, own) if harmonics else {}),
-                }
-                # A weight, and other torques over the position, are not in what slow rows are held against.
-                if steady is not NOWHERE and axis.gravity != "pendulum" and not chosen.get("orders"):
-                    creep = steady
-                rows = widest
-            else:
-                skew = bands[0].numbers["skew"].value
-                rows, falls, *_ = rows_of(signals, factor * width, skew, exponents, math.inf)
-            bands.append(fit_band(rows, falls, **{**options, **chosen}))
+            if first is None:
+                first = in_widest(signals, factor * width, axis, options, harmonics, period, exponents)
+                bands.append(first.seen.fits[0])
+                continue
+            skew = bands[0].numbers["skew"].value
+            rows, falls, *_ = rows_of(signals, factor * width, skew, exponents, math.inf)
+            bands.append(fit_band(rows, falls, **first.others))
         except InputError as error:
             lacking = error
-    if not bands:
+    if first is None:
         raise lacking
-    return Bands(tuple(bands), tuple(widest), tuple(chosen.get("orders", [])), creep=creep)
+    if first.stiffer is not None and not swings_alike([b.swing for b in bands]):
+        stiffer = {**options, "train": first.stiffer}
+        return in_bands(signals, width, axis, stiffer, harmonics, period, exponents)
+    return replace(first.seen, fits=tuple(bands))
+
+
+class Widest(NamedTuple):
+    """The widest band, how the others are fitted, and the train to be taken where its swing is none."""
+
+    seen: Bands
+    others: dict[str, Any]
+    stiffer: Train | None
+
+
+def in_widest(
+    signals: Sequence[Signals], width: float, axis: ServoAxis, options: Mapping[str, Any], harmonics: bool,
+    period: float | None, exponents: Sequence[float],
+) -> Widest:  # fmt: skip
+    """The first band: there the search for the skew begins, a torque over the position shows, and what moves."""
+    known = options["skew"]
+    start = clear_skew(signals, width) if known is None else known
+    rows, falls, creep, steady = rows_of(signals, width, start, exponents, FAR[axis.motion])
+    chosen: dict[str, Any] = {**options, "start": start}
+    if harmonics:
+        chosen |= orders_in(rows, falls, axis, period, chosen)
+    orders: tuple[float, ...] = tuple(chosen.get("orders", ()))
+    # A weight, and other torques over the position, are not in what slow rows are held against.
+    if steady is not NOWHERE and axis.gravity != "pendulum" and not orders:
+        creep = steady
+    found, train, stiffer = fit_band(rows, falls, **chosen), options.get("train", Train.RIGID), None
+    if "train" not in options:
+        found, train, stiffer = freed(found, lambda train: fit_band(rows, falls, **chosen, train=train))
+    seen = Bands((found,), tuple(rows), orders, creep=creep, train=train)
+    return Widest(seen, {**chosen, "train": train}, stiffer)
+
+
+def freed(rigid: BandFit, fit: Callable[[Train], BandFit]) -> tuple[BandFit, Train, Train | None]:
+    """What is fitted with as much give of the train as the rows need, and where that is a swing what else they may."""
+    gives, swings = fit(Train.GIVES), fit(Train.SWINGS)
+    found, train = (gives, Train.GIVES) if gives.misfit < GIVES * rigid.misfit else (rigid, Train.RIGID)
+    if swings.misfit < SWINGS * min(gives.misfit, rigid.misfit):
+        return swings, Train.SWINGS, train
+    return found, train, None
 
 
 def decided(found: Bands, none: Bands) -> Bands:
@@ -323,58 +346,3 @@ def rows_of(
     if not faster or creep is NOWHERE:
         faster, creep = rows, NOWHERE
     return faster, falls, creep, steady_lack(first, faster, skew, far)
-
-
-# ---- what the bands say together ------------------------------------------------------------
-
-
-def that_tell(name: str, bands: Sequence[BandFit]) -> list[BandFit]:
-    """The fits that tell of a number."""
-    least = min(b.numbers[name].std for b in bands)
-    signed = name in ROTATED or name in ("skew", "offset", "uneven", *DRIFTS)
-
-    def tells(n: Number) -> bool:
-        return n.std <= max(TELLING * least, 0.0 if signed else NARROW * abs(n.value))
-
-    return [b for b in bands if tells(b.numbers[name])]
-
-
-def telling(name: str, bands: Sequence[BandFit]) -> list[Number]:
-    """What the fits that tell of a number say."""
-    return [b.numbers[name] for b in that_tell(name, bands)]
-
-
-def together(name: str, bands: Sequence[BandFit]) -> Number:
-    """One number of all bands that tell of it: their mean, and their spread beside each one's own."""
-    told = telling(name, bands)
-    found = mixed(told)
-    against = [
-        n for n in (b.numbers[name] for b in bands)
-        if n not in told and abs(n.value - found.value) > QUANTILE * math.hypot(n.std, found.std)
-    ]  # fmt: skip
-    return mixed([*told, *against]) if against else found
-
-
-def mixed(numbers: Sequence[Number]) -> Number:
-    """Their mean, with the spread of what each says."""
-    value = math.fsum(n.value for n in numbers) / len(numbers)
-    variance = math.fsum(n.std**2 + (n.value - value) ** 2 for n in numbers) / len(numbers)
-    return Number(value, math.sqrt(variance))
-
-
-def holding(found: Number, perhaps: Number) -> Number:
-    """A number whose interval holds what it may be as well."""
-    return Number(found.value, max(found.std, abs(perhaps.value - found.value) / QUANTILE))
-
-
-def as_told(numbers: Mapping[str, Number], size: float, period: float) -> Number:
-    """The skew, s: no surer than its usual size where the inertia, by which acceleration shows it, is not told."""
-    found, untold = numbers["skew"], not numbers["inertia"].told_to_two
-    return Number(found.value, math.hypot(found.std, FINEST * period, size if untold else 0.0))
-
-
-def with_form(level: Number, slope: Number) -> Number:
-    """The level of friction, where the slope beside it is not told no surer than a law's form is true."""
-    if slope.told_to_two:
-        return level
-    return Number(level.value, math.hypot(level.std, FORM * level.value))

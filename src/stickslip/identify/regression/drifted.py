@@ -9,9 +9,10 @@ from typing import Any
 
 from stickslip.errors import InputError
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
-from stickslip.identify.regression.bands import GAUSSIAN, Bands, calmed, in_bands, together
+from stickslip.identify.regression.bands import GAUSSIAN, Bands, calmed, in_bands
 from stickslip.identify.regression.drifting import same_motion, usual_speed
 from stickslip.identify.regression.sliding_rows import Signals
+from stickslip.identify.regression.together import together
 from stickslip.machines.servo import ServoAxis
 
 DRIFT_SHOWN, DRIFT_LEAST, DRIFT_UNSURE = 3.0, 0.02, 0.09
@@ -29,6 +30,7 @@ def calm_beside_drift(
 ) -> Bands:  # fmt: skip
     """What windows in which motor and load move as one show, beside a drift of friction where that shows."""
     first = beside_drift(in_bands(signals, width, axis, options, *ask), signals, width, axis, options, *ask)
+    options = {**options, "train": first.train}
     seen = calmed(first, signals, width, axis, {**options, "drifting": first.drifts}, *ask)
     return seen if seen is first else beside_drift(seen, signals, width, axis, options, *ask)
 
@@ -40,7 +42,7 @@ def beside_drift(
     if found.drifts:
         return found
     exponents = GAUSSIAN if found.widened > 1.0 else tuple(USUAL_EXPONENTS)
-    beside = {**options, "drifting": True}
+    beside = {**options, "drifting": True, "train": found.train}
     with contextlib.suppress(InputError):
         other = in_bands(signals, found.widened * width, axis, beside, *ask, exponents=exponents)
         if shows_a_drift(other):

@@ -23,19 +23,7 @@ from stickslip.identify.experiment import Experiment, insist_on_motion
 from stickslip.identify.fit.smooth import Window
 from stickslip.identify.regression.band_fit import EACH_WAY, BandFit
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
-from stickslip.identify.regression.bands import (
-    ROTATED,
-    USUALLY,
-    WEIGHT,
-    as_told,
-    decided,
-    holding,
-    in_bands,
-    rough,
-    that_tell,
-    together,
-    with_form,
-)
+from stickslip.identify.regression.bands import USUALLY, WEIGHT, decided, in_bands, rough
 from stickslip.identify.regression.creeping import NOWHERE, Creep
 from stickslip.identify.regression.drifted import calm_beside_drift
 from stickslip.identify.regression.drifting import DRIFTS, drift_torque
@@ -51,6 +39,7 @@ from stickslip.identify.regression.sliding_rows import (
     sliding_rows,
 )
 from stickslip.identify.regression.strokes import stacked
+from stickslip.identify.regression.together import ROTATED, as_told, holding, that_tell, together, with_form
 from stickslip.machines.servo import ServoAxis
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -385,7 +374,7 @@ def regress_axis(
         numbers[name] = holding(numbers[name], together(name, seen.perhaps))
     for way in ("", "_positive", "_negative") if each_way else ("",):
         numbers[f"fc{way}"] = with_form(numbers[f"fc{way}"], numbers[f"sigma2{way}"])
-    numbers["skew"] = Number(skew, size) if skew is not None else as_told(numbers, size, period)
+    numbers["skew"] = Number(skew, size) if skew is not None else as_told(numbers, size, period, seen.train)
     weight = WEIGHT if axis.gravity == "pendulum" else ()
     whole = [sliding_rows(s, Window(width, s.period)) for s in signals]
     return Regression(

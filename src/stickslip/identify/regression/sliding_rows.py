@@ -139,8 +139,8 @@ class SlidingRows:
         s, rad (m), rad/s (m/s; signed).
     fixed : array, shape (n, p)
         Acceleration, velocity, direction, 1.
-    jerk : array, shape (n,)
-        rad/s³ (m/s³).
+    jerk, snap : array, shape (n,)
+        Derivatives of the acceleration, the first and the second, rad/s³ and rad/s⁴ (m/s³, m/s⁴).
     falling : array, shape (n, m)
         What is left of friction's fall, in the direction of motion, for every one that `falling_at` was asked for.
     stroke : array of int, shape (n,)
@@ -160,6 +160,7 @@ class SlidingRows:
     speed: Array
     fixed: Array
     jerk: Array
+    snap: Array
     falling: Array
     stroke: np.ndarray[Any, np.dtype[np.int64]]
     signals: Signals
@@ -190,7 +191,7 @@ class SlidingRows:
     def only(self, kept: np.ndarray[Any, np.dtype[np.bool_]]) -> SlidingRows:
         """Only some of the rows."""
         return SlidingRows(
-            self.time[kept], self.position[kept], self.speed[kept], self.fixed[kept], self.jerk[kept],
+            self.time[kept], self.position[kept], self.speed[kept], self.fixed[kept], self.jerk[kept], self.snap[kept],
             self.falling[kept], np.unique(self.stroke[kept], return_inverse=True)[1].astype(np.int64),
             self.signals, self.window, self.places[kept], self.gone[kept], self.quick,
         )  # fmt: skip
@@ -242,7 +243,7 @@ def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
         If there are hardly any.
     """
     q, period = signals.position, signals.period
-    v, a, jerk = seen(q, window.weights(1), window.weights(2), window.weights(3))
+    v, a, jerk, snap = seen(q, *(window.weights(k) for k in (1, 2, 3, 4)))
     fine = fine_window(window)
     (quick,) = seen(q, fine.weights(1))
     direction = np.sign(quick)
@@ -263,7 +264,7 @@ def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
     stroke = np.cumsum(rises) - 1
     return SlidingRows(
         signals.time[places], q[places] + signals.origin, v[places],
-        np.column_stack([a[places], v[places], sign, np.ones(places.size)]), jerk[places],
+        np.column_stack([a[places], v[places], sign, np.ones(places.size)]), jerk[places], snap[places],
         np.zeros((places.size, 0)), stroke, signals, window, places, np.abs(q[places] - q[stopped[places]]), quick,
     )  # fmt: skip
 

@@ -1,0 +1,74 @@
+"""What certain sliding shows of a record besides numbers, in sentences: timing, widths of windows, friction's form."""
+
+from __future__ import annotations
+
+from stickslip.identify.axis.agreed import ALIGNED, KNOWN
+from stickslip.identify.regression.bent import bend_told
+from stickslip.identify.regression.regression import Regression
+from stickslip.machines.servo import ServoAxis
+
+
+def on_timing(found: Regression | None) -> list[str]:
+    """When the torque acted, in a sentence; nothing where the record does not tell."""
+    if found is None:
+        return []
+    low, high = found.interval("skew")
+    half, row = 0.5 * (high - low), found.period
+    if half > KNOWN * row or not found.shows_inertia:
+        return []
+    value = found.numbers["skew"].value
+    where = "after" if value < 0.0 else "before"
+    share = -value / row
+    kind = (
+        "as a command held from row to row" if abs(share - 0.5) <= max(ALIGNED, half / row)
+        else "as a value sampled at the row" if abs(share) <= max(ALIGNED, half / row)
+        else "as a mean over the row before" if abs(share + 0.5) <= max(ALIGNED, half / row)
+        else "a hold and a delay together"
+    )  # fmt: skip
+    return [
+        f"The torque acted {1e3 * abs(value):.3g} ms (±{1e3 * half:.2g}) {where} its row on average, {abs(share):.2g} "
+        f"of a row: {kind}; this is allowed for."
+    ]
+
+
+def on_width(found: Regression | None) -> list[str]:
+    """That motor and load do not move as one in the shortest windows, in a sentence; nothing where they do."""
+    if found is None or found.widened == 1.0:
+        return []
+    return [
+        f"Faster than {found.bands[0].corner:.2g} Hz the axis does not move as one inertia (play that opens while it "
+        f"slides, a train that rings): inertia and friction are those of slower motion."
+    ]
+
+
+def on_creep(found: Regression | None, axis: ServoAxis) -> list[str]:
+    """That friction is missing where the axis creeps, in a sentence; nothing where it is not."""
+    if found is None or found.creep.speed == 0.0:
+        return []
+    speed, missing = f"{found.creep.speed:.3g} {axis.unit('rad/s')}", f"{found.creep.missing:.0%}"
+    if found.creep.steady:
+        return [
+            f"Slower than {speed} {missing} of friction's level is missing although the axis slides steadily: friction "
+            f"rises with velocity in another form than a level and a slope, which are those of faster motion alone."
+        ]
+    return [
+        f"Slower than {speed} {missing} of friction's level is missing (a motor that goes on alone within the play, or "
+        f"friction that builds up with velocity): inertia and friction are those of faster motion."
+    ]
+
+
+def on_bend(found: Regression | None) -> list[str]:
+    """That friction rises with velocity in another form than a level and a slope, in a sentence; nothing where it does
+    not."""
+    bend = 0.0 if found is None else bend_told({b.corner: b.bend for b in found.bands})
+    if bend == 0.0:
+        return []
+    how, why = (
+        ("faster", "drag with the square of the speed, a motor whose torque constant falls with the current")
+        if bend > 0.0 else ("more slowly", "a lubricant that thins")
+    )  # fmt: skip
+    return [
+        f"Friction rises ever {how} with velocity, as no law here does ({why}): over the recorded speeds the curve "
+        f"bends by {min(abs(bend), 1.0):.0%} of Fc more, and level and slope hold there alone. Identify with a law of "
+        "your own (--law FILE.py), or read the curve (identify --method sliding)."
+    ]
