@@ -77,8 +77,8 @@ class Window:
             w -= self.weights(1) * (w @ t)
             return w / (w @ (t**3 / 6.0))
         w = (x**4 - 6.0 * x * x + 3.0) * bell
-        w -= self.weights(2) * (w @ (0.5 * t * t))
         w -= bell * w.sum()
+        w -= self.weights(2) * (w @ (0.5 * t * t))
         return w / (w @ (t**4 / 24.0))
 
     def noise(self, derivative: int) -> float:

@@ -1,0 +1,164 @@
+"""A load behind a spring, a filter in the torque's column, friction of another form: simulated here in plain steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip.identify.axis.agreed import told_apart
+from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.axis.in_sentences import on_bend
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.experiment import Experiment
+from stickslip.identify.fit.smooth import Window, seen
+from stickslip.identify.regression.bent import bend_told
+from stickslip.identify.regression.flexible import swings_alike
+from stickslip.identify.regression.regression import Regression, regress_axis
+from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
+
+AXIS = ServoAxis(drive_side="load")
+MOTOR, LOAD, STEP, EVERY = 3e-4, 5e-4, 5e-5, 20
+
+
+def reference(t: float) -> tuple[float, float]:
+    """Moves there and back with ramps of 0.12 s at three speeds, rad and rad/s."""
+    speed = (20.0, 50.0, 110.0)[int(t / 1.6) % 3]
+    phase, side = (t % 0.8) / 0.8, 1.0 if (t % 1.6) < 0.8 else -1.0
+    ramp = min(1.0, phase / 0.15, (0.9 - phase) / 0.15) if phase < 0.9 else 0.0
+    return 0.0, side * speed * max(ramp, 0.0)
+
+
+def driven(frequency: float, friction: Callable[[float], float], seconds: float = 9.6) -> Experiment:
+    """A motor on a spring of a load that swings so often a second with the motor held, under velocity control."""
+    stiffness = LOAD * (2.0 * math.pi * frequency) ** 2
+    damping = 0.1 * math.sqrt(stiffness * LOAD)
+    q, v, x, w, gone, torque = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    rows: list[tuple[float, float, float]] = []
+    noise = np.random.default_rng(5).standard_normal(round(seconds / STEP / EVERY) + 1)
+    for k in range(round(seconds / STEP)):
+        t = k * STEP
+        if k % EVERY == 0:
+            wanted = reference(t)[1]
+            gone += (wanted - v) * STEP * EVERY
+            torque = 0.02 * (wanted - v) + 0.2 * gone
+            rows.append((t, q, torque + 1e-4 * noise[k // EVERY]))
+        spring = stiffness * (q - x) + damping * (v - w)
+        v += STEP * (torque - spring - friction(v)) / MOTOR
+        w += STEP * spring / LOAD
+        q += STEP * v
+        x += STEP * w
+    time, position, drive = np.array(rows).T
+    return Experiment("belt", time, position, drive)
+
+
+def rigid(friction: Callable[[float], float]) -> Experiment:
+    """The same with a spring that hardly gives."""
+    return driven(160.0, friction)
+
+
+def coulomb(v: float) -> float:
+    """0.2 N·m and 0.8 mN·m·s/rad, the sign rounded within 0.05 rad/s."""
+    return 0.2 * math.tanh(v / 0.05) + 8e-4 * v
+
+
+@pytest.mark.parametrize("frequency", [11.0, 16.0, 25.0])
+def test_a_load_that_swings_behind_a_belt_does_not_count_as_more_inertia(frequency: float) -> None:
+    """Of 23 belts of another program eight had 10 to 27 % too much, identified."""
+    found = regress_axis([driven(frequency, coulomb)], AXIS)
+    low, high = found.interval("inertia")
+    assert low < MOTOR + LOAD < high
+    assert found.numbers["inertia"].value == pytest.approx(MOTOR + LOAD, rel=0.02)
+    assert found.numbers["fc"].value == pytest.approx(0.2, rel=0.03)
+
+
+def test_a_filter_in_the_column_of_the_torque_does_not_count_as_less_inertia() -> None:
+    """A display filter of 8 ms: 2 to 9 % too little, identified."""
+    log = rigid(coulomb)
+    assert log.drive is not None
+    filtered, last, part = np.empty_like(log.drive), 0.0, log.period / (8e-3 + log.period)
+    for k, torque in enumerate(log.drive.tolist()):
+        last += part * (torque - last)
+        filtered[k] = last
+    found = regress_axis([Experiment("filtered", log.time, log.position, filtered)], AXIS)
+    low, high = found.interval("inertia")
+    assert low < MOTOR + LOAD < high
+    assert found.numbers["inertia"].value == pytest.approx(MOTOR + LOAD, rel=0.01)
+
+
+def bend(found: Regression) -> float:
+    """What the bands say together."""
+    return bend_told({b.corner: b.bend for b in found.bands})
+
+
+@pytest.mark.parametrize(
+    ("friction", "sign", "said"),
+    [
+        (lambda v: math.tanh(v / 0.05) * (0.1 + 0.05 * math.sqrt(abs(v))), -1.0, "more slowly"),
+        (lambda v: math.tanh(v / 0.05) * (0.2 + 4e-5 * v * v) + 5e-4 * v, 1.0, "faster"),
+    ],
+)
+def test_friction_that_rises_in_another_form_identifies_no_level_and_slope(
+    friction: Callable[[float], float], sign: float, said: str
+) -> None:
+    """A lubricant that thins, and drag with the square of the speed: level 71 % too high, slope 267 %, identified."""
+    log = rigid(friction)
+    found = regress_axis([log], AXIS)
+    assert sign * bend(found) > 0.0
+    (sentence,) = on_bend(found)
+    assert said in sentence
+    low, high = found.interval("inertia")
+    assert low < MOTOR + LOAD < high
+    result = identify_axis([log], AXIS, ["coulomb"])
+    for name in ("fc", "sigma2"):
+        assert not result[name].identified
+    assert sentence in result.notes
+
+
+def test_a_level_that_friction_of_another_form_alone_puts_in_doubt_says_so() -> None:
+    """Within a factor of ten of the speeds the level comes out to a few parts in a hundred, and is none."""
+    found = regress_axis([rigid(coulomb)], AXIS)
+    bands = tuple(replace(b, bend=0.2) for b in found.bands)
+    model = Model("coulomb", fc=0.2, sigma2=8e-4)
+    sure = [Estimate(n, "N·m", n, x, 1e-3 * x, 0.99 * x, 1.01 * x, True, "")
+            for n, x in (("fc", 0.2), ("sigma2", 8e-4))]  # fmt: skip
+    assert all(e.identified for e in told_apart(sure, found, model))
+    for e in told_apart(sure, replace(found, bands=bands), model):
+        assert not e.identified
+        assert "ever faster" in e.verdict
+
+
+def test_friction_with_a_level_and_a_slope_does_not_bend() -> None:
+    found = regress_axis([rigid(coulomb)], AXIS)
+    assert bend(found) == 0.0
+    assert on_bend(found) == []
+
+
+def test_a_bend_is_what_two_bands_show() -> None:
+    assert bend_told({60.0: 0.2, 37.0: 0.1}) == 0.2
+    assert bend_told({60.0: 0.2, 37.0: 0.01}) == 0.0
+    assert bend_told({60.0: 0.2, 37.0: -0.1}) == 0.0
+    assert bend_told({60.0: -0.04, 37.0: -0.04}) == 0.0
+    assert bend_told({}) == 0.0
+
+
+def test_a_swing_is_about_the_same_in_two_bands() -> None:
+    assert swings_alike([-1e-4, -2e-4, 5.0])
+    assert not swings_alike([-1e-4, -3e-4])
+    assert not swings_alike([-1e-4, 1e-4])
+    assert not swings_alike([-1e-4])
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 3, 4])
+def test_a_window_shows_a_derivative_exactly_of_the_power_of_its_order(order: int) -> None:
+    window = Window(0.012, 1e-3)
+    t = (np.arange(401) - 200) * 1e-3
+    (shown,) = seen(t**order, window.weights(order))
+    assert shown[200] == pytest.approx(math.factorial(order), rel=1e-9)
+    for lower in range(order):
+        (none,) = seen(t**lower, window.weights(order))
+        assert abs(none[200]) < 1e-6 / window.width ** (order - lower)
