@@ -23,7 +23,8 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
-from stickslip.report.plots import Curve, Panel, Style, draw
+from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.styles import Style
 from stickslip.simulation.closed_loop import prepare, simulate
 
 AXIS = RigidAxis(INERTIA, PLANT)

@@ -10,7 +10,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from stickslip.report.plots import Curve, Panel, draw, envelope, style_of
+from stickslip.report.plots import Curve, Panel, draw, envelope
+from stickslip.report.styles import style_of
 from stickslip.study.study import execute, load
 
 LABELS = {

@@ -18,7 +18,8 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Harmonics
 from stickslip.model import Model, Reference
 from stickslip.record import Record
-from stickslip.report.plots import REFERENCE, Curve, Panel, Style, draw
+from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.styles import REFERENCE, Style
 from stickslip.simulation.closed_loop import simulate
 from stickslip.study.bench import Planned, planned, read_bench
 

@@ -8,7 +8,8 @@ from pages import GENERATED, write
 
 from stickslip import plugins
 from stickslip.model import Reference
-from stickslip.report.plots import Curve, Panel, Style, draw
+from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.styles import Style
 
 FOLDER = GENERATED / "references"
 LINE = Style("#0072B2", "-", 1.4)

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
-from stickslip.report.plots import Curve, Panel, Style, draw
+from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.styles import Style
 
 LEVELS = {"fs": 1.5, "fc": 1.0, "vs": 1e-3, "sigma2": 0.4}  # N, N, m/s, N·s/m
 LUGRE = Model("lugre", sigma0=1e5, sigma1=1e5**0.5, **LEVELS)

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from stickslip import Model, Record, Reference, law, respond
-from stickslip.report.plots import Curve, Panel, Style, draw
+from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.styles import Style
 
 SHARE = 0.7  # of the static and of the Coulomb torque is left for v < 0
 EXAMPLE = law("gms").example

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from stickslip import Model, Record, Reference, law, respond
-from stickslip.report.plots import Curve, Panel, Style, draw
+from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.styles import Style
 
 HARMONICS = {1: 0.10, 6: 0.04}  # periods per revolution: share of the torque
 SPEED = 0.2  # rad/s

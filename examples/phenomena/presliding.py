@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, law, respond, simulate
-from stickslip.report.plots import Curve, Panel, Style, draw
+from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.styles import Style
 
 GMS = Model("gms", **law("gms").example)
 LUGRE = Model("lugre", **law("lugre").example)

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
-from stickslip.report.plots import Curve, Panel, Style, draw
+from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.styles import Style
 
 CONTACT = Model("lugre", sigma0=1e5, sigma1=1e5**0.5, sigma2=0.4, fc=1.0, fs=1.5, vs=1e-3)
 SPRING, SPEED = 2.0, 0.1  # N/m, m/s

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from stickslip import Model, Record, Reference, law, respond
-from stickslip.report.plots import Curve, Panel, Style, draw
+from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.styles import Style
 
 DRIFT, TIME = -0.3, 60.0  # of the torque in the long run; s
 PERIOD, PERIODS, SAMPLES = 10.0, 24, 2000  # s; and samples in each

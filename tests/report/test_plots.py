@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.report import plots
+from stickslip.report.styles import REFERENCE
 
 
 @pytest.mark.parametrize(
@@ -15,7 +16,7 @@ from stickslip.report import plots
     [(0.36, 6.5), (9.2, 9.9), (2.1, 4.4), (0.19, 11.0), (0.02, 5.0), (110.0, 160.0), (3.0, 3.01)],
 )
 def test_labels_of_a_logarithmic_axis_do_not_overlap_at_half_width(low: float, high: float) -> None:
-    curve = plots.Curve(np.array([low, high]), np.array([0.0, 1.0]), "", plots.REFERENCE)
+    curve = plots.Curve(np.array([low, high]), np.array([0.0, 1.0]), "", REFERENCE)
     figure = plots._figure("title", "message", [plots.Panel([curve], "y", "x", x_scale="log")], 2.0)
     figure.canvas.draw()
     axes = figure.axes[0]

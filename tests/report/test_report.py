@@ -12,12 +12,15 @@ import numpy as np
 import pytest
 
 from stickslip import report
+from stickslip.approval import allow_code
 from stickslip.report._tables import MetricsTable, metrics_tables
 from stickslip.report._view import StudyView
 from stickslip.report.captions import case_caption, case_message
 from stickslip.report.conclusions import helped, rig_conclusion
-from stickslip.report.figures import drawn_style, off_scale
-from stickslip.report.plots import envelope, scaled, style_of
+from stickslip.report.figures import off_scale, result_cases
+from stickslip.report.plots import envelope, one_prefix, scaled
+from stickslip.report.styles import LINEAR as LINEAR_STYLES
+from stickslip.report.styles import REFERENCE, style_of, styles_of
 from stickslip.study.result import Run, StudyResult
 from stickslip.study.study import load, run
 
@@ -108,16 +111,17 @@ LINEAR = ("PD", "PID")
 def test_the_message_names_the_best_of_all_and_the_best_compensator() -> None:
     errors = {"PD": 9.95e-3, "PID": 0.338e-3, "helped": 0.866e-3, "worse": 2e-3}
     assert case_message(runs("position_rms_rad", **errors), False, LINEAR) == (
-        "Least RMS error: PID 0.338 mrad; best compensator helped 0.866 mrad; PD 9.95 mrad"
+        "Least RMS error: PID\u00a00.338 mrad; best compensator helped\u00a00.866; PD\u00a09.95"
     )
     assert case_message(runs("position_rms_rad", **{**errors, "helped": 1e-4}), False, LINEAR) == (
-        "Least RMS error: helped 0.1 mrad; PD 9.95 mrad, PID 0.338 mrad"
+        "Least RMS error: helped\u00a00.1 mrad; PD\u00a09.95, PID\u00a00.338"
     )
     assert case_message(runs("position_rms_rad", PD=2e-3, PID=1e-3), False, LINEAR) == (
-        "Least RMS error: PID 1 mrad; PD 2 mrad"
+        "Least RMS error: PID\u00a01 mrad; PD\u00a02"
     )
     assert (
-        case_message(runs("position_rms_rad", helped=1e-3), False, LINEAR) == "Least RMS error: helped 1 mrad"
+        case_message(runs("position_rms_rad", helped=1e-3), False, LINEAR)
+        == "Least RMS error: helped\u00a01 mrad"
     )
     failed = [replace(r, failure="it broke") for r in runs("position_rms_rad", PD=1e-3)]
     assert case_message(failed, False, LINEAR) == "no run was finished"
@@ -140,9 +144,11 @@ def at_rest(**values: tuple[float, float, float, float]) -> list[Run]:
 def test_at_rest_a_limit_cycle_around_the_target_is_not_the_best(result: StudyResult) -> None:
     found = at_rest(bare=(4e-4, 4e-4, 0.0, 0.5), helped=(4e-3, 1e-9, 50.0, 0.1))
     assert case_message(found, True, ["bare"]) == (
-        "Least RMS error in the second half: bare 0.4 mrad; best compensator helped 4 mrad"
+        "Least RMS error in the second half: bare\u00a00.4 mrad; best compensator helped\u00a04"
     )
-    assert case_caption(found, True).startswith("By RMS error in the second half, best first: bare 0.4 mrad")
+    assert case_caption(found, True).startswith(
+        "By RMS error in the second half in mrad, best first: bare 0.4, helped 4."
+    )
     step = {"references": {"slow": {"kind": "step"}}}
     (table,) = metrics_tables(StudyView(replace(result, runs=found, config={**result.config, **step})))
     assert marked(table, "second_half_position_rms_rad") == [True, False]
@@ -158,16 +164,25 @@ def marked(table: MetricsTable, metric: str) -> list[bool]:
 
 def test_the_note_says_over_what_an_error_is_off_the_scale() -> None:
     sizes = {"a": 1e-3, "b": 7.63e-3}
-    assert off_scale(sizes, 2e-3, False) == "off scale: b 7.63 mrad"
-    assert off_scale(sizes, 2e-3, True) == "off scale in the second half: b 7.63 mrad"
-    assert off_scale(sizes, 1.0, True) == ""
+    assert off_scale(sizes, 2e-3, (1e3, "mrad"), False) == "off scale: b 7.63 mrad"
+    assert off_scale(sizes, 2e-3, (1.0, "rad"), True) == "off scale in the second half: b 0.00763 rad"
+    assert off_scale(sizes, 1.0, (1e3, "mrad"), True) == ""
 
 
-def test_a_dense_line_is_drawn_and_named_without_dashes() -> None:
-    x = np.linspace(0.0, 1.0, 2001)
-    style = style_of("FB-coulomb")
-    assert drawn_style(style, (x, np.sin(6.0 * x))) == style
-    assert drawn_style(style, (x, np.sin(6.0 * x)), (x, np.sin(400.0 * x))).dashes == "-"
+def test_one_figure_has_one_prefix() -> None:
+    assert one_prefix(1.0, 4e-3) == (1e3, "m")  # 1000 mrad beside 4 mrad
+    assert one_prefix(0.02, 5e-5) == (1e3, "m")
+    assert one_prefix(2.0, 0.2) == (1.0, "")
+    assert one_prefix(100.0, 1e-3) == (1.0, "")
+    assert one_prefix(2e-5, 1e-6) == (1e6, "µ")
+    assert one_prefix(0.0, float("nan")) == (1.0, "")
+
+
+@pytest.mark.parametrize("name", ["PD", "PID", "FF-lugre", "FB-coulomb", "mine"])
+def test_a_controllers_line_is_whole_and_unlike_the_reference(name: str) -> None:
+    style = style_of(name, ["PD", "PID"])
+    assert style.dashes == "-"  # dashes of a line that oscillates are noise
+    assert style.colour != REFERENCE.colour
 
 
 def test_figures_are_the_same_bytes_again(result: StudyResult) -> None:
@@ -192,13 +207,70 @@ def test_units_are_those_that_read_well() -> None:
     assert [scaled(v, "rad") for v in (2.0, 0.02, 2e-6)] == [(1.0, "rad"), (1e3, "mrad"), (1e6, "µrad")]
 
 
-def test_a_law_keeps_its_colour_and_strangers_differ() -> None:
-    assert style_of("FF-gms") == style_of("FB-gms") == style_of("gms")
-    names = ["a", "b", "PD", "c"]
-    assert len({style_of(n, names) for n in names}) == 4
-    # Beside PD and PID a spare colour is none of theirs.
-    beside = ["PD", "PID", "FF", "MINE", "THIRD"]
-    assert len({style_of(n, beside).colour for n in beside}) == 5
+def test_a_law_keeps_its_colour_and_others_differ() -> None:
+    forward, back = style_of("FF-gms"), style_of("FB-gms")
+    assert style_of("gms") == forward == replace(back, hollow=False)
+    assert back.hollow
+    names = ["PD", "PID", "FF-gms", "FB-gms", "MINE-gms", *(f"own-{i}" for i in range(40))]
+    styles = styles_of(names)
+    assert list(styles) == names
+    assert len(set(styles.values())) == len(names)
+    # Those that one figure holds beside the linear controllers differ in colour from each other and from these.
+    five = {styles[f"own-{i}"].colour for i in range(5)}
+    assert len(five) == 5
+    assert not five & {LINEAR_STYLES["PD"].colour, LINEAR_STYLES["PID"].colour}
+
+
+OWN_LOOP = '''
+from typing import Annotated, NamedTuple
+from stickslip.control_spec import ControlLaw
+from stickslip.spec import Par
+
+class Params(NamedTuple):
+    slope: Annotated[float, Par("N·m/rad", "k", "slope", positive=True)]
+
+def sample(y, z, p, u):
+    """Torque, N·m."""
+    return min(max(p.slope * y.error, -1.0), 1.0)
+
+CONTROL_LAW = ControlLaw("own_loop", Params, sample, "loop", title="A saturated slope", source=("own",),
+                         equation="T", example={"slope": 1.0})
+'''
+
+
+def test_own_laws_and_observers_count_among_the_compensators_and_parts_say_so(tmp_path: Path) -> None:
+    (tmp_path / "own_loop.py").write_text(OWN_LOOP, encoding="utf-8")
+    lines = ["sample_time = 1e-3", 'loop = {law = "pd"}']
+    more = [
+        "[controllers.own]", lines[0], 'loop = {law = "own_loop", slope = 3.0}',
+        "[controllers.observer]", *lines, 'observer = {law = "disturbance_observer", corner = 200.0}',
+        "[controllers.inertia]", *lines, 'feedforward = {law = "inertia_feedforward"}',
+        "[controllers.law]", *lines, 'feedforward = {law = "friction_feedforward", friction = "guess"}',
+        *(line for i in range(6) for line in (f"[controllers.gain-{i}]", 'linear = "PD"',
+          'compensator = "feedforward"', 'law = "guess"', f"gain = 0.{i + 1}")),
+    ]  # fmt: skip
+    text = 'plugins = ["own_loop.py"]\n' + STUDY.replace("fc = 0.25", "fc = 0.25\nsigma2 = 0.01")
+    (tmp_path / "own.toml").write_text(text + "\n".join(more), encoding="utf-8")
+    with allow_code():
+        planned = load(tmp_path / "own.toml").runs
+    kinds = {run.controller: run.compensation for run in planned}
+    assert {name: kinds[name] for name in ("bare", "own", "observer", "inertia", "law", "helped")} == {
+        "bare": "", "own": "feedback", "observer": "feedback", "inertia": "", "law": "feedforward",
+        "helped": "feedforward",
+    }  # fmt: skip
+    made = [
+        Run(p.slip_rule, p.reference, p.friction, p.controller, {"position_rms_rad": 1e-3 * (i + 1)},
+            Path("no.npz"), compensation=p.compensation)
+        for i, p in enumerate(planned)
+    ]  # fmt: skip
+    view = StudyView(StudyResult(tmp_path, made, {}, {}))
+    parts = [case for case in result_cases(view, "signed") if case.kind == "feedforward"]
+    assert [(case.part, case.parts) for case in parts] == [(0, 2), (1, 2)]
+    said = [
+        case_message(c.every, False, ["bare", "inertia"], shown=[r.controller for r in c.runs]) for c in parts
+    ]
+    assert "best compensator helped\u00a02; inertia" in said[0]
+    assert "best compensator helped\u00a02 (another part)" in said[1]
 
 
 def test_importing_the_report_loads_no_matplotlib() -> None:

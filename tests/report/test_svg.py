@@ -11,7 +11,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from stickslip.report.plots import Curve, Panel, Style
+from stickslip.report.plots import Curve, Panel
+from stickslip.report.styles import Style
 from stickslip.report.svg import embedded_svg, svg_of, ticks_between
 
 LINE = Style("#0072B2", (0, (5, 1.5)), 1.4)

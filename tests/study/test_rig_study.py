@@ -147,7 +147,7 @@ def test_experiments_of_ones_own_are_a_study(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "PD10-FF-half" in said
     assert "mine-seed-1" in said
-    assert "least RMS error" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Least RMS error" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

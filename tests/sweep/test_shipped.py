@@ -10,6 +10,8 @@ import pytest
 from stickslip.cli import main
 from stickslip.report import sweep_pictures
 from stickslip.report.sweep_pictures import draw
+from stickslip.report.swept_names import number_named, symbol
+from stickslip.study.study import load as study_of
 from stickslip.sweep import execute
 from stickslip.sweep.block import compute
 from stickslip.sweep.gains import recommended
@@ -75,10 +77,48 @@ def test_a_gain_of_a_grid_is_one_of_its_points(tmp_path, monkeypatch):
     monkeypatch.setattr(sweep_pictures, "draw_panels", lambda stem, *about: drawn.update({stem.name: about}))
     draw(tmp_path / "out", sweep)
     title, message, panels, _ = drawn["gain-signed-sine-nominal"]
-    assert title == "mine: controller.gain, friction.fs varied in study small_study"
-    assert panels[0].y_label == "95th percentile (mrad)"
-    assert "95th percentile of the RMS position error" in message
-    assert message.endswith(f"FF-lugre {found.gain:.2f}")
+    assert title == "mine: 2 parameters of study small_study varied"
+    assert panels[0].y_label == "RMS position error,\n95th percentile (mrad)"
+    assert message.startswith(f"Best gain: FF-lugre\u00a0{found.gain:.2f} ({sweep.drawn.cases} cases")
+    assert all(name.isascii() and "." not in name for name in drawn_names(drawn))
+
+
+def drawn_names(drawn):
+    """What stands along y in the tornado pictures."""
+    return [
+        n.replace("$", "") for stem, about in drawn.items() if "tornado" in stem for n in about[2][0].y_names
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("axis.inertia", ("$J$", "kg·m²")),
+        ("friction.fs", ("$F_{S}$", "N·m")),
+        ("friction.sigma2", (r"$\sigma_{2}$", "N·m·s/rad")),
+        ("law.fc", ("$F_{C}$, model", "N·m")),
+        ("controller.bandwidth_hz", ("bandwidth", "Hz")),
+        ("controller.gain", ("compensator gain", "")),
+        ("controller.observer_corner", ("observer corner", "")),
+    ],
+)
+def test_a_number_is_shown_as_the_field_writes_it(name, shown):
+    run = next(r for r in study_of("thesis").runs if r.controller == "FF-lugre")
+    assert number_named(run, name) == shown
+
+
+@pytest.mark.parametrize(
+    ("written", "shown"),
+    [
+        ("F_S", "$F_{S}$"),
+        ("sigma_0", r"$\sigma_{0}$"),
+        ("DV", "DV"),
+        ("v(t - tau_L)", "v(t - tau_L)"),
+        ("a$b", "ab"),
+    ],
+)
+def test_a_symbol_that_mathtext_cannot_set_is_written_plainly(written, shown):
+    assert symbol(written) == shown
 
 
 def test_a_gain_drawn_as_a_factor_is_told_as_a_gain(tmp_path):

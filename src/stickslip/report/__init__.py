@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 def draw(result: StudyResult) -> list[Figure]:
     """Draw a study's figures into ``figures/`` of its folder, as SVG and PNG.
 
+    Figures of an earlier run that are not drawn again are deleted.
+
     Parameters
     ----------
     result : StudyResult
@@ -30,7 +32,12 @@ def draw(result: StudyResult) -> list[Figure]:
 
     view = StudyView(result)
     makers = (reference_figures, response_figures, drive_figures, comparison_figures, result_figures)
-    return [figure for make in makers for figure in make(view, result.folder / "figures")]
+    figures = [figure for make in makers for figure in make(view, result.folder / "figures")]
+    made = {f"{figure.stem}{suffix}" for figure in figures for suffix in (".svg", ".png")}
+    for file in (result.folder / "figures").glob("*/figure-*"):
+        if file.suffix in (".svg", ".png") and str(file) not in made:  # of an earlier run
+            file.unlink()
+    return figures
 
 
 def write(result: StudyResult) -> Path:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from stickslip.analyse.wording import quantity
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.machines.rigid import RigidAxis
@@ -16,7 +15,8 @@ from stickslip.model import Model, Reference
 from stickslip.record import Record
 from stickslip.report._view import StudyView
 from stickslip.report.figures import COMMON, Figure, describe, heading, named
-from stickslip.report.plots import Array, Curve, Panel, Style, draw, envelope, scaled, style_of
+from stickslip.report.plots import Array, Curve, Panel, draw, envelope, one_prefix
+from stickslip.report.styles import Style, style_of, styles_of
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.prescribed.open_loop import respond
 from stickslip.study.plan import Drive, Response, Study, load
@@ -59,7 +59,8 @@ def response_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
         limits = (-NEAR_ZERO, NEAR_ZERO) if near else None
         title = heading(response.figure, response.title)
         plant = near and next(iter(loops)) in view.frictions
-        message = _gap(loops, near, "the plant" if plant else next(iter(loops)))
+        called = {n: plants.get(n, n) for n in loops} if not near else {}
+        message = _gap(loops, near, "the plant" if plant else next(iter(loops)), called)
         draw(stem, title, message, [Panel(curves, "friction torque (N·m)", "velocity (rad/s)", limits)], 2.7)
         caption = f"Along {describe(response.motion.as_dict())}. {message}."
         yield Figure(stem.name.removeprefix("figure-"), response.figure, title, caption, COMMON, stem)
@@ -88,21 +89,29 @@ def _loop_curve(name: str, x: Array, y: Array, near: bool, plant: str, count: in
         dots = np.cumsum(np.hypot(np.diff(x, prepend=x[0]) / np.ptp(x), np.diff(y, prepend=y[0]) / np.ptp(y)))
         keep = np.append(np.diff(np.floor(dots * 800.0)) > 0, True)
         x, y = x[keep], y[keep]
-    style = PLANT.get(name, PLANT["nominal"]) if plant else style_of(name)
+    style = PLANT.get(name, PLANT["nominal"]) if plant else law_style(name)
     label = f"{name} law" if not plant else "plant" if near else plant
     if count == 1 or (near and not plant):
         style = replace(style, width=1.1)
     return Curve(x, y, label if count > 1 else "", style)
 
 
-def _gap(loops: dict[str, tuple[Array, Array]], near: bool, first: str) -> str:
-    """Largest difference from the loop named first, over what is shown."""
+def law_style(name: str) -> Style:
+    """A law beside the plant: in its colour, dashed, so that the plant's line shows below."""
+    return replace(style_of(name), dashes=(0, (4, 1.2)), width=1.4, mark="")
+
+
+def _gap(loops: dict[str, tuple[Array, Array]], near: bool, first: str, called: Mapping[str, str]) -> str:
+    """Largest difference from the loop named first, over what is shown; `called`: the legend's names."""
     (_, (x, torque)), *others = loops.items()
     shown = np.abs(x) <= NEAR_ZERO if near else np.ones(x.size, np.bool_)
     gaps = {name: float(np.max(np.abs(y - torque)[shown])) for name, (_, y) in others}
-    words = ", ".join(f"{name} {quantity(gap, 'N·m')}" for name, gap in gaps.items())
+    words = ", ".join(
+        f"{called.get(name, name)} {gap:.3g} N·m" if len(gaps) > 1 else f"{gap:.3g} N·m"
+        for name, gap in gaps.items()
+    )
     return (
-        f"Largest difference from {first}: {words}"
+        f"Largest difference from {called.get(first, first)}: {words}"
         if words
         else f"Peak torque {np.max(np.abs(torque)):.4g} N·m"
     )
@@ -113,19 +122,19 @@ def drive_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
     study = planned(view.result) if view.result.config.get("drives") else None
     for drive in study.drives if study else ():
         records = {name: _driven(axis, drive) for name, axis in drive.axes.items()}
-        factor, unit = scaled(max(float(np.ptp(r["position"])) for r in records.values()), "rad")
+        factor, prefix = one_prefix(max(float(np.ptp(r["position"])) for r in records.values()))
         labels = {n: "plant" if n in view.frictions else f"{n} law" for n in records}
         curves = [
             Curve(*envelope(r.time, factor * r["position"]), labels[n], style)
             for n, r in records.items()
-            for style in [PLANT["nominal"] if n in view.frictions else replace(style_of(n), dashes="--")]
+            for style in [PLANT["nominal"] if n in view.frictions else law_style(n)]
         ]
         title = heading(drive.figure, drive.title)
         peaks = ", ".join(
-            f"{labels[n]} {1e3 * float(np.max(r['position'])):.4g} mrad" for n, r in records.items()
+            f"{labels[n]} {factor * float(np.max(r['position'])):.4g} {prefix}rad" for n, r in records.items()
         )
         stem = folder / COMMON / named(drive.figure, f"drive-{drive.name}")
-        panel = Panel(curves, f"position ({unit})", "time (s)", (0.0, drive.duration))
+        panel = Panel(curves, f"position ({prefix}rad)", "time (s)", (0.0, drive.duration))
         draw(stem, title, f"Largest position: {peaks}", [panel], 2.7)
         caption = (
             f"Open loop under {drive.amplitude:g} N·m at {drive.frequency:g} Hz. Largest position: {peaks}. Gross "
@@ -172,15 +181,21 @@ def _comparison(
     period = 1.0 / view.result.config["references"][reference].get("frequency", np.inf)
     end = period * WINDOWS[number] if number in WINDOWS and period else None
     last = max(float(r.time[-1]) for r in records.values())
+    lines = {
+        word: {c: _error(r, word, end or np.inf) for c, r in records.items()}
+        for word in ("position", "velocity")
+    }
+    largest = [max(float(np.max(np.abs(y))) for _, y in own.values()) for own in lines.values()]
+    factor, prefix = one_prefix(*largest)
+    styles = styles_of(list(dict.fromkeys([*view.controllers, *records])))
     panels: list[Panel] = []
-    for word in ("position", "velocity"):
-        lines = {c: _error(r, word, end or np.inf) for c, r in records.items()}
-        factor, unit = scaled(max(float(np.max(np.abs(y))) for _, y in lines.values()), UNITS[word])
-        curves = [Curve(*envelope(x, factor * y), c, style_of(c)) for c, (x, y) in lines.items()]
-        panels.append(Panel(curves, f"{word} error ({unit})", "time (s)", (0.0, end or last)))
+    for word, own in lines.items():
+        curves = [Curve(*envelope(x, factor * y), c, styles[c]) for c, (x, y) in own.items()]
+        label = f"{word} error ({prefix}{UNITS[word]})"
+        panels.append(Panel(curves, label, "time (s)", (0.0, end or last)))
     words = f"{' and '.join(cases)}, {'without friction' if friction == 'none' else friction + ' friction'}"
     stem = folder / COMMON / named(number, f"{name}-{reference}-{friction}")
-    message = "RMS error: " + ", ".join(f"{c} {1e3 * v:.4g} mrad" for c, v in rms.items())
+    message = "RMS position error: " + ", ".join(f"{c} {factor * v:.3g} {prefix}rad" for c, v in rms.items())
     draw(stem, heading(number, words), message, panels, 1.6)
     caption = f"{title}: tracking errors along {reference!r}, {words.partition(', ')[2]}. {message}."
     return Figure(stem.name.removeprefix("figure-"), number, heading(number, words), caption, COMMON, stem)

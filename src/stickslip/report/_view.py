@@ -21,6 +21,7 @@ class StudyView:
         self.references = list(dict.fromkeys(run.reference for run in result.runs))
         self.frictions = list(dict.fromkeys(run.friction for run in result.runs))
         self.controllers = list(dict.fromkeys(run.controller for run in result.runs))
+        self._compensations = {run.controller: run.compensation for run in self.runs.values()}
 
     def metric(self, rule: str, case: str, name: str) -> float:
         """One metric of a run; KeyError where it is missing or failed."""
@@ -42,8 +43,8 @@ class StudyView:
         return [self.runs[key] for key in keys if key in self.runs]
 
     def compensation(self, controller: str) -> str:
-        """`feedforward`, `feedback`, or the empty string for a controller without compensator."""
-        return str(self._setting("controllers", controller).get("compensator", ""))
+        """`feedforward`, `feedback`, or the empty string for a linear controller alone."""
+        return self._compensations.get(controller, "")
 
     def reference_kind(self, reference: str) -> str:
         """The kind of a reference, `sine`; the empty string where the configuration does not say."""

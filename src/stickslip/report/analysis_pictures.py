@@ -15,7 +15,8 @@ from stickslip.analyse.motor_vs_sensor import Sides
 from stickslip.analyse.repeatability import Repeated
 from stickslip.analyse.spectrum import Spectrum
 from stickslip.machines.drivetrain import Chain
-from stickslip.report.plots import SPARE, Curve, Panel, Style, envelope, save, scaled
+from stickslip.report.plots import Curve, Panel, envelope, save, scaled
+from stickslip.report.styles import Style
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Drawn = tuple[str, str, Sequence[Panel], float]
@@ -25,7 +26,12 @@ MAIN = Style("#0072B2", "-", 1.3)
 OTHER = Style("#D55E00", (0, (4, 1.2)), 1.3)
 BOUND = Style("#000000", (0, (1, 1.5)), 1.3)
 BAND = Style("#0072B2", "-", 0.6)
-LINES = (MAIN, OTHER, *SPARE[1:])
+DASHED = (
+    Style("#D55E00", (0, (4, 1))), Style("#CC79A7", (0, (1.5, 0.8))), Style("#0072B2", (0, (6, 2))),
+    Style("#009E73", (0, (2, 2))), Style("#E69F00", (0, (1, 0.7))), Style("#56B4E9", (0, (8, 2))),
+    Style("#7f7f7f", (0, (3, 1, 1, 1, 1, 1))),
+)  # fmt: skip
+LINES = (MAIN, OTHER, *DASHED[1:])
 SHARES = np.linspace(0.02, 0.98, 97)
 SPLITS = {"the rest at the motor": 0.001, "the rest in the middle": 0.999}
 
@@ -61,7 +67,7 @@ def _density(one: Spectrum) -> Panel:
 
 
 def _marks(count: int) -> list[Style]:
-    return [Style(SPARE[i % len(SPARE)].colour, SPARE[i % len(SPARE)].dashes, 1.0) for i in range(count)]
+    return [Style(DASHED[i % len(DASHED)].colour, DASHED[i % len(DASHED)].dashes, 1.0) for i in range(count)]
 
 
 def picture_of_repeatability(found: Sequence[Repeated]) -> Drawn:
@@ -170,7 +176,7 @@ def picture_of_flexibility(found: Flexibility) -> Drawn:
         Curve(ends, np.full(2, found.floor), f"lowest possible, {found.floor:.0f} Hz", Style("#000000", "-", 1.6))
     )  # fmt: skip
     curves += [
-        Curve(ends, np.full(2, f), f"stated, {f:.0f} Hz", Style(SPARE[i].colour, BOUND.dashes, 1.4))
+        Curve(ends, np.full(2, f), f"stated, {f:.0f} Hz", Style(DASHED[i].colour, BOUND.dashes, 1.4))
         for i, f in enumerate(found.claimed)
     ]
     top = 2.5 * found.floor

@@ -94,7 +94,7 @@ def message_of(own: Sequence[Standing]) -> str:
     fit = [s for s in own if not s.why_not]
     if not fit:
         return "None is fit to be switched on: each fails, chatters, hunts, or is somewhere worse than the PD alone."
-    share = f"{100.0 * fit[0].mean:.0f} %"
+    share = f"{100.0 * fit[0].mean:.2g} %"
     return f"{fit[0].label} leaves {share} of the error of the PD alone, the least that neither hunts nor chatters."
 
 
@@ -133,10 +133,10 @@ def dots(title: str, message: str, own: Sequence[Standing]) -> str:
         f'viewBox="0 0 {WIDTH:.0f} {height:.0f}" font-family="DejaVu Sans, Verdana, Helvetica, Arial, sans-serif" '
         'font-size="11">',
         f'<rect width="{WIDTH:.0f}" height="{height:.0f}" fill="#ffffff"/>',
-        f'<text x="8" y="16" font-weight="bold">{escape(title)}</text>',
+        f'<text x="8" y="16" font-weight="bold">Machine {escape(title)}</text>',
         f'<text x="8" y="32" fill="#444444">{escape(message)}</text>',
     ]
-    for tick in (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0):
+    for tick in (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0):
         if low <= tick <= high:
             x, weight = across(tick), "1.4" if tick == 1.0 else "0.5"
             parts += [

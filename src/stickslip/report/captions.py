@@ -9,6 +9,7 @@ from stickslip.analyse.wording import quantity
 from stickslip.study.result import Run
 
 OSCILLATES = 20e-3  # rad/s RMS above 50 Hz; the statements' measure
+MILLI = (1e3, "mrad")
 HUNTS = 2.0  # reversals/s while the reference is at rest
 
 
@@ -40,21 +41,54 @@ def ranking(runs: Sequence[Run], name: str) -> list[Run]:
     return sorted(done, key=lambda r: _get(r, name))
 
 
-def case_message(runs: Sequence[Run], at_rest: bool, linear: Sequence[str]) -> str:
-    """Which run tracks best; the best compensator where that is another; the other linear controllers."""
+def error_of(value: float, factor: float) -> str:
+    """An error (rad) times a factor, as tables write it: three digits, none below a thousandth of the unit."""
+    scaled = abs(factor * value)
+    if scaled < 1e-3:
+        return "0" if scaled < 1e-7 else "<0.001"
+    return f"{scaled:.3g}" if scaled < 1000.0 else f"{scaled:.0f}"
+
+
+def case_message(
+    runs: Sequence[Run],
+    at_rest: bool,
+    linear: Sequence[str],
+    unit: tuple[float, str] = MILLI,
+    shown: Sequence[str] | None = None,
+) -> str:
+    """Which run tracks best; the best compensator where that is another; the other linear controllers.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        All that are compared, those that other figures show included.
+    at_rest : bool
+        Whether the reference comes to rest.
+    linear : sequence of str
+        The controllers without compensator.
+    unit : tuple of (float, str)
+        In which all errors are given, its factor from rad first.
+    shown : sequence of str, optional
+        The controllers that the figure shows, where it does not show all.
+    """
     name, words = figure_of_merit(at_rest)
     ranked = ranking(runs, name)
     if not ranked:
         return "no run was finished"
-    numbers = {r.controller: f"{r.controller} {quantity(_get(r, name), 'rad')}" for r in ranked}
+    numbers = {r.controller: f"{r.controller}\u00a0{error_of(_get(r, name), unit[0])}" for r in ranked}
     best = ranked[0].controller
     helped = next((c for c in numbers if c not in linear), best)
-    parts = [f"Least {words}: {numbers[best]}"]
+    parts = [f"Least {words}: {numbers[best]} {unit[1]}" + aside(best, shown)]
     if helped != best:
-        parts.append(f"best compensator {numbers[helped]}")
+        parts.append(f"best compensator {numbers[helped]}" + aside(helped, shown))
     rest = [numbers[r.controller] for r in runs if r.controller in linear and r.controller in numbers]
     rest = [words for words in rest if words != numbers[best]]
     return "; ".join([*parts, *([", ".join(rest)] if rest else [])])
+
+
+def aside(name: str, shown: Sequence[str] | None) -> str:
+    """That a controller is in another part of a figure, where it is."""
+    return " (another part)" if shown is not None and name not in shown else ""
 
 
 def case_caption(runs: Sequence[Run], at_rest: bool) -> str:
@@ -62,8 +96,8 @@ def case_caption(runs: Sequence[Run], at_rest: bool) -> str:
     name, words = figure_of_merit(at_rest)
     ranked = ranking(runs, name)
     sentences = [
-        f"By {words}, best first: "
-        + ", ".join(f"{r.controller} {quantity(_get(r, name), 'rad')}" for r in ranked)
+        f"By {words} in mrad, best first: "
+        + ", ".join(f"{r.controller} {error_of(_get(r, name), MILLI[0])}" for r in ranked)
         + "."
     ]
     moving = [r for r in ranked if oscillates(r, at_rest)]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +12,14 @@ import numpy as np
 
 from stickslip.plugins import reference_kind
 from stickslip.record import Record
-from stickslip.report import plots
 from stickslip.report._view import StudyView
-from stickslip.report.captions import case_caption, case_message
-from stickslip.report.plots import REFERENCE, Array, Curve, Panel, draw, envelope, scaled, style_of
+from stickslip.report.captions import case_caption, case_message, error_of
+from stickslip.report.plots import Curve, Panel, draw, envelope, one_prefix
+from stickslip.report.styles import LAWS, REFERENCE, Style, styles_of
 from stickslip.study.result import Run
 
 COMMON = "both"  # folder of the figures that no slip rule changes
 LINES = 7  # as many controllers as one figure still shows
-DENSE = 50  # turning points of a drawn line
 
 
 @dataclass(frozen=True)
@@ -64,11 +64,13 @@ def reference_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
         message = f"Reference: {what(view, reference)}"
         window = steady_window(record) or (0.0, float(record.time[-1]))
         panels: list[Panel] = []
-        for channel, word in (("position_reference", "position"), ("velocity_reference", "velocity")):
-            factor, unit = scaled(float(np.max(np.abs(record[channel]))), record.units[channel])
+        channels = {"position": "position_reference", "velocity": "velocity_reference"}
+        factor, prefix = one_prefix(*(float(np.max(np.abs(record[c]))) for c in channels.values()))
+        for word, channel in channels.items():
             shown = record.time <= window[1]
             x, y = envelope(record.time[shown], record[channel][shown] * factor)
-            panels.append(Panel([Curve(x, y, "", plots.LAWS["gms"])], f"{word} ({unit})", "time (s)", window))
+            label = f"{word} ({prefix}{record.units[channel]})"
+            panels.append(Panel([Curve(x, y, "", Style(LAWS["gms"].colour))], label, "time (s)", window))
         title = heading(
             number, f"Reference {reference!r}" if not number else f"The {view.edition.references[reference]}"
         )
@@ -118,7 +120,10 @@ class Case:
     friction: str
     kind: str
     runs: Sequence[Run]
+    every: Sequence[Run]
+    """Those of the case's other parts too, where one figure does not hold all."""
     part: int = 0
+    parts: int = 1
 
     @property
     def name(self) -> str:
@@ -141,11 +146,12 @@ def result_cases(view: StudyView, rule: str) -> Iterator[Case]:
             for kind in view.kinds() or [""]:
                 helped = [r for r in runs if kind and view.compensation(r.controller) == kind]
                 base = linear[: LINES - 2] if helped else []
-                room = LINES - len(base)
                 rest = helped or linear
-                for part in range(0, len(rest), room):
+                count = math.ceil(len(rest) / (LINES - len(base)))
+                for part in range(count):
+                    own = rest[part * len(rest) // count : (part + 1) * len(rest) // count]
                     yield Case(
-                        rule, reference, friction, kind, [*base, *rest[part : part + room]], part // room
+                        rule, reference, friction, kind, [*base, *own], [*linear, *helped], part, count
                     )
 
 
@@ -156,40 +162,76 @@ def result_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
             number = view.edition.results.get((case.reference, case.friction, case.kind), "")
             stem = folder / rule / named(number, case.name)
             at_rest = view.reference_kind(case.reference) == "step"
-            linear = [r.controller for r in case.runs if not view.compensation(r.controller)]
-            message = case_message(case.runs, at_rest, linear)
-            reference = view.edition.references.get(case.reference, case.reference)
-            friction = view.edition.frictions.get(case.friction, case.friction)
-            words = f"{reference}, {friction}" + (f", {case.kind}" if case.kind else "")
-            panels = result_panels(case, view.controllers, at_rest)
-            if not panels:
+            linear = [r.controller for r in case.every if not view.compensation(r.controller)]
+            records = records_of(case)
+            if not records:
                 continue
-            draw(stem, heading(number, words), message, panels)
+            limit = error_limit(case, records, at_rest)
+            span = max(float(np.ptp(record["position_reference"])) for record in records.values())
+            factor, prefix = one_prefix(span, limit)
+            unit = (factor, f"{prefix}rad")
+            title = heading(number, titled(view, case))
+            message = case_message(case.every, at_rest, linear, unit, [r.controller for r in case.runs])
+            draw(stem, title, message, result_panels(case, records, limit, view.controllers, unit, at_rest))
             yield Figure(
-                f"{rule}-{stem.name.removeprefix('figure-')}", number, heading(number, words),
+                f"{rule}-{stem.name.removeprefix('figure-')}", number, title,
                 case_caption(case.runs, at_rest), rule, stem,
             )  # fmt: skip
 
 
-def result_panels(case: Case, controllers: Sequence[str], at_rest: bool) -> list[Panel]:
-    """Position above, error below; errors far beyond the others' are left off the scale and named."""
+def titled(view: StudyView, case: Case) -> str:
+    """A case in words, and which part of it a figure shows."""
+    reference = view.edition.references.get(case.reference, f"reference {case.reference}")
+    friction = view.edition.frictions.get(case.friction, f"friction {case.friction}")
+    words = f"{reference}, {friction}" + (f", {case.kind}" if case.kind else "")
+    words += f" (part {case.part + 1} of {case.parts})" if case.parts > 1 else ""
+    return words[0].upper() + words[1:]
+
+
+def records_of(case: Case) -> dict[str, Record]:
+    """The records of a case's runs by controller, without those that are missing or end at once."""
     records = {r.controller: r.record() for r in case.runs if r.path.exists()}
-    records = {name: record for name, record in records.items() if len(record) > 1}
-    if not records:
-        return []
+    return {name: record for name, record in records.items() if len(record) > 1}
+
+
+def error_sizes(records: Mapping[str, Record], at_rest: bool) -> dict[str, float]:
+    """Largest error of each record (rad); at rest of its second half, which leaves the transient aside."""
+    errors = {name: r["position_reference"] - r["position"] for name, r in records.items()}
+    return {name: float(np.max(np.abs(e[e.size // 2 if at_rest else 0 :]))) for name, e in errors.items()}
+
+
+def error_limit(case: Case, records: Mapping[str, Record], at_rest: bool) -> float:
+    """Half height of the error's axis, rad."""
+    return readable_limit(sorted(error_sizes(records, at_rest).values()), case.kind == "feedback")
+
+
+def result_panels(
+    case: Case, records: Mapping[str, Record], limit: float, controllers: Sequence[str], unit: tuple[float, str],
+    at_rest: bool,
+) -> list[Panel]:  # fmt: skip
+    """Position above, error below; errors far beyond the others' are left off the scale and named.
+
+    Parameters
+    ----------
+    case : Case
+    records : mapping of str to Record
+        By controller.
+    limit : float
+        Half height of the error's axis, rad.
+    controllers : sequence of str
+        Of the whole study, which decide on the styles.
+    unit : tuple of (float, str)
+        Of both axes, its factor from rad first.
+    at_rest : bool
+        Whether the reference comes to rest.
+    """
     first = max(records.values(), key=lambda r: float(r.time[-1]))
     errors = {name: r["position_reference"] - r["position"] for name, r in records.items()}
-    # At rest the second half counts, which leaves the transient aside.
-    sizes = {name: float(np.max(np.abs(e[e.size // 2 if at_rest else 0 :]))) for name, e in errors.items()}
-    limit = readable_limit(sorted(sizes.values()), case.kind == "feedback")
-    p_factor, p_unit = scaled(float(np.ptp(first["position_reference"])), "rad")
-    e_factor, e_unit = scaled(limit, "rad")
+    sizes = error_sizes(records, at_rest)
+    factor, named_unit = unit
     # Far outside the axes a line need not go on.
     shown = {n: np.clip(e, -2 * limit, 2 * limit) for n, e in errors.items()}
-    styles = {
-        n: drawn_style(style_of(n, controllers), (r.time, r["position"]), (r.time, shown[n]))
-        for n, r in records.items()
-    }
+    styles = styles_of(controllers)
     # The legend's handles, in the study's order.
     positions = [Curve(first.time[:0], first.time[:0], n, styles[n]) for n in records]
     positions.insert(0, Curve(first.time[:0], first.time[:0], "reference", REFERENCE))
@@ -197,41 +239,27 @@ def result_panels(case: Case, controllers: Sequence[str], at_rest: bool) -> list
     # Large errors first, so that small ones are drawn over them.
     for name in sorted(records, key=lambda n: -sizes[n]):
         record, style = records[name], styles[name]
-        positions.append(Curve(*envelope(record.time, p_factor * record["position"]), "", style))
+        positions.append(Curve(*envelope(record.time, factor * record["position"]), "", style))
         # A line that is outside the axes most of the time only hides the others.
         if np.mean(np.abs(errors[name]) > limit) < 0.35:
-            deviations.append(Curve(*envelope(record.time, e_factor * shown[name]), "", style))
-    x, y = envelope(first.time, p_factor * first["position_reference"])
+            deviations.append(Curve(*envelope(record.time, factor * shown[name]), "", style))
+    x, y = envelope(first.time, factor * first["position_reference"])
     positions.append(Curve(x, y, "", REFERENCE))
     low, high = float(y.min()), float(y.max())
     margin = 0.35 * (high - low or 1.0)
     return [
-        Panel(positions, f"position ({p_unit})", "time (s)", (0.0, float(first.time[-1])),
+        Panel(positions, f"position ({named_unit})", "time (s)", (0.0, float(first.time[-1])),
               (low - margin, high + margin), f"{case.rule} slip rule"),
-        Panel(deviations, f"position error ({e_unit})", "time (s)", None, (-e_factor * limit, e_factor * limit),
-              off_scale(sizes, limit, at_rest)),
+        Panel(deviations, f"position error ({named_unit})", "time (s)", None, (-factor * limit, factor * limit),
+              off_scale(sizes, limit, unit, at_rest)),
     ]  # fmt: skip
 
 
-def off_scale(sizes: dict[str, float], limit: float, at_rest: bool) -> str:
-    """Which errors go beyond the limit, and how far: over the whole run, at rest in its second half."""
-    factor, unit = scaled(limit, "rad")
-    words = [f"{name} {factor * size:.3g}" for name, size in sizes.items() if size > limit]
+def off_scale(sizes: Mapping[str, float], limit: float, unit: tuple[float, str], at_rest: bool) -> str:
+    """Which errors (rad) go beyond the limit, and how far in a unit (its factor from rad first)."""
+    words = [f"{name} {error_of(size, unit[0])}" for name, size in sizes.items() if size > limit]
     what = "off scale in the second half" if at_rest else "off scale"
-    return f"{what}: {', '.join(words)} {unit}" if words else ""
-
-
-def drawn_style(style: plots.Style, *lines: tuple[Array, Array]) -> plots.Style:
-    """The style in which lines are drawn, and named in the legend: thin and without dashes if one is dense."""
-    return replace(style, dashes="-", width=0.6) if any(dense(x, y) for x, y in lines) else style
-
-
-def dense(x: Array, y: Array) -> bool:
-    """Whether a line oscillates so often that its dashes could not be told apart."""
-    _, y = envelope(x, y)
-    steps = np.diff(y)
-    steps = steps[np.abs(steps) > 0.02 * np.ptp(y)]  # A ripple within the line's width is none.
-    return int(np.sum(steps[1:] * steps[:-1] < 0.0)) > DENSE
+    return f"{what}: {', '.join(words)} {unit[1]}" if words else ""
 
 
 def readable_limit(sizes: Sequence[float], feedback: bool) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from stickslip.identify.estimate import Picture, Trace
 from stickslip.report import plots
+from stickslip.report.styles import REFERENCE, Style
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -55,7 +56,7 @@ def panel_of(picture: Picture) -> plots.Panel:
             continue
         curve = _curve(trace, x_factor, y_factor, styles)
         if below is not None and below.y2 is not None:
-            edge = plots.Style(curve.style.colour, "-", 0.6)
+            edge = Style(curve.style.colour, "-", 0.6)
             x, low, high = x_factor * below.x, y_factor * below.y, y_factor * below.y2
             curves.append(plots.Curve(x, low, below.label, edge, kind="band", y2=high))
             below = None
@@ -75,27 +76,27 @@ def _readable(label: str, values: Sequence[Array]) -> tuple[float, str]:
 
 def _curve(trace: Trace, x_factor: float, y_factor: float, styles: Iterator[tuple[str, Any]]) -> plots.Curve:
     if trace.label == "reference":
-        style = plots.REFERENCE
+        style = REFERENCE
     elif trace.kind == "points":
-        style = plots.Style("#000000", "", 1.1)
+        style = Style("#000000", "", 1.1)
     elif trace.kind == "open points":
-        style = plots.Style("#D55E00", "", 1.1)
+        style = Style("#D55E00", "", 1.1)
     elif trace.kind == "wide":
-        style = plots.Style("#E69F00", "-", 3.2)
+        style = Style("#E69F00", "-", 3.2)
     elif trace.kind == "cloud":
-        style = plots.Style("#000000", "", 1.0)
+        style = Style("#000000", "", 1.0)
     elif trace.kind == "rug":
-        style = plots.Style("#555555", "", 0.8)
+        style = Style("#555555", "", 0.8)
     elif trace.kind == "faint":
-        style = plots.Style("#E69F00", "-", 0.5)
+        style = Style("#E69F00", "-", 0.5)
     elif trace.kind in ("band", "dense"):
-        style = plots.Style("#56B4E9", "-", 0.6)
+        style = Style("#56B4E9", "-", 0.6)
     elif trace.kind == "vertical":
-        style = plots.Style("#D55E00", (0, (1.5, 1)), 1.3)
+        style = Style("#D55E00", (0, (1.5, 1)), 1.3)
     elif not trace.label:
-        style = plots.Style("#555555", (0, (1, 1.5)), 0.8)
+        style = Style("#555555", (0, (1, 1.5)), 0.8)
     else:
         colour, dashes = next(styles)
-        style = plots.Style(colour, dashes, 1.4)
+        style = Style(colour, dashes, 1.4)
     y2 = None if trace.y2 is None else y_factor * trace.y2
     return plots.Curve(x_factor * trace.x, y_factor * trace.y, trace.label, style, kind=trace.kind, y2=y2)

@@ -19,7 +19,8 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.jit import flat
 from stickslip.model import Model
-from stickslip.report.plots import DATES, DPI, FORMATS, RC, WIDTH, Array, Curve, Panel, Style, save, scaled
+from stickslip.report.plots import DATES, DPI, FORMATS, RC, WIDTH, Array, Curve, Panel, save, scaled
+from stickslip.report.styles import Style
 from stickslip.simulation.prescribed.motion import Samples, packed_numbers, torque_along
 from stickslip.spec import Law
 

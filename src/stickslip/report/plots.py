@@ -19,11 +19,14 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.report.styles import MARKS, Style
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WIDTH = 4.4  # inches: printed at half a page's width, 8 points stay above 5
 DPI = 144
+LETTER = 0.068  # inches, of a name along y
+MARKED = 5  # marks along a line
 LEGEND = 80  # characters in a row of the legend, 9 of them an entry's line and gap
 FORMATS = (".svg", ".png", ".pdf")
 BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:[mµ]?(?:rad|N·m|s|Hz|A|V|N)|kg·m²|%|/s)(?![\w·]))")
@@ -50,57 +53,12 @@ RC: dict[str, Any] = {
 
 
 @dataclass(frozen=True)
-class Style:
-    """Colour (Okabe-Ito, safe for the colour-blind), dashes, width (points) and marker of a line."""
-
-    colour: str
-    dashes: Any = "-"
-    width: float = 1.1
-    marker: str = ""
-
-
-REFERENCE = Style("#000000", (0, (1, 1.5)), 1.3)
-LAWS = {
-    "coulomb": Style("#E69F00", (0, (5, 1.5))),
-    "stribeck": Style("#56B4E9", (0, (3, 1, 1, 1))),
-    "lugre": Style("#009E73", (0, (7, 1.5, 1.5, 1.5))),
-    "gms": Style("#0072B2", "-", 1.5),
-}
-LINEAR = {
-    "PD": Style("#555555", (0, (1, 1)), 1.3),
-    "PID": Style("#CC79A7", (0, (2.5, 1))),
-    "PR": Style("#D55E00", "-"),
-}
-SPARE = (
-    Style("#D55E00", (0, (4, 1))), Style("#CC79A7", (0, (1.5, 0.8))), Style("#0072B2", (0, (6, 2))),
-    Style("#009E73", (0, (2, 2))), Style("#E69F00", (0, (1, 0.7))), Style("#56B4E9", (0, (8, 2))),
-    Style("#7f7f7f", (0, (3, 1, 1, 1, 1, 1))),
-)  # fmt: skip
-
-
-def style_of(name: str, others: Sequence[str] = ()) -> Style:
-    """The style of a controller or law by its name; of an unknown one a spare by its place among the unknown names,
-    first those in colours that no known name beside it has."""
-    if known := _known_style(name):
-        return known
-    strangers = [n for n in others if not _known_style(n)]
-    taken = {style.colour for n in others if (style := _known_style(n))}
-    free = sorted(SPARE, key=lambda style: style.colour in taken)
-    return free[strangers.index(name) % len(free) if name in strangers else 0]
-
-
-def _known_style(name: str) -> Style | None:
-    """Of a linear controller, or of the law that a name ends with."""
-    return LINEAR.get(name) or LAWS.get(name.rpartition("-")[2])
-
-
-@dataclass(frozen=True)
 class Curve:
     """One line: its points, shape (n,), label (empty for none in the legend) and style.
 
-    ``kind`` is "line" (as is any word not named here), "points", "open points", "cloud" (many small points), "vertical"
-    (a line across the panel at every x), "rug" (a mark at the foot of the panel at every x), "band" (filled between
-    y and y2) or "area" (filled where y2, shape (len(y), len(x)), is above 0).
+    ``kind`` is "line" (as is any word not named here), "points", "open points", "cloud" (many small points), "bar" (a
+    line with plain ends), "vertical" (a line across the panel at every x), "rug" (a mark at the foot of the panel at
+    every x), "band" (filled between y and y2) or "area" (filled where y2, shape (len(y), len(x)), is above 0).
     """
 
     x: Array
@@ -164,6 +122,17 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
     if not math.isfinite(largest) or largest >= 0.1 or largest == 0.0:
         return 1.0, unit
     return (1e3, f"m{unit}") if largest >= 1e-4 else (1e6, f"µ{unit}")
+
+
+def one_prefix(*largest: float) -> tuple[float, str]:
+    """Factor and prefix in which all values of a figure read well, given the largest of each panel: nothing, m or µ.
+
+    One figure has one prefix, so that its panels can be compared.
+    """
+    known = [x for x in largest if math.isfinite(x) and x > 0.0]
+    if not known or min(known) >= 0.1 or max(known) >= 10.0:
+        return 1.0, ""
+    return (1e3, "m") if max(known) >= 1e-4 else (1e6, "µ")
 
 
 def quantity(value: float, unit: str) -> str:
@@ -273,7 +242,7 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
         top = head + height * i
         # Fixed margins: matplotlib's layout engines take longer than the drawing.
         foot = 0.2 if shared else 0.52  # Room for every panel's own label where the axes differ.
-        left = 0.19 if panel.y_names else 0.14
+        left = _left(panel)
         box = (left, 1.0 - (top + height + 0.06 - foot) / total, 0.97 - left, (height - foot) / total)
         axes.append(figure.add_axes(box, sharex=axes[0] if axes and shared else None))
         _fill(axes[-1], panel, bare=shared and i < len(panels) - 1)
@@ -287,9 +256,21 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
     return figure
 
 
+def _left(panel: Panel) -> float:
+    """Where the axes begin, of the figure's width: right of the names along y."""
+    if not panel.y_names:
+        return 0.17 if "\n" in panel.y_label else 0.14
+    letters = max(len(re.sub(r"[\\${}_]", "", name)) for name in panel.y_names)
+    return min(max(0.19, (0.16 + LETTER * letters) / WIDTH), 0.45)
+
+
 def _line(axes: Any, curve: Curve) -> None:
     style, label = curve.style, curve.label or "_nolegend_"
-    if curve.kind == "vertical":
+    if curve.kind == "bar":
+        axes.plot(
+            curve.x, curve.y, color=style.colour, linewidth=style.width, solid_capstyle="butt", label=label
+        )
+    elif curve.kind == "vertical":
         for x in curve.x:
             axes.axvline(x, color=style.colour, linestyle=style.dashes, linewidth=style.width, label=label)
     elif curve.kind == "area" and curve.y2 is not None:
@@ -325,13 +306,31 @@ def _line(axes: Any, curve: Curve) -> None:
             )
             axes.plot([], [], color=style.colour, linewidth=6.0, alpha=0.35, label=label)
             label = "_"
+        if style.mark:
+            _marks(axes, curve, label)
+            label = "_"
         axes.plot(
             curve.x, curve.y, color=style.colour, linestyle=style.dashes, linewidth=style.width, label=label,
             marker=style.marker, markersize=3.5,
         )  # fmt: skip
 
 
-def _plain_ticks(axes: Any, low: float, high: float) -> None:
+def _marks(axes: Any, curve: Curve, label: str) -> None:
+    """Marks at a few places of a line whose x rises, each style's at other places; in the legend on its line."""
+    style = curve.style
+    look = {
+        "color": style.colour, "marker": style.mark, "markersize": 3.6, "markeredgewidth": 0.8,
+        "markerfacecolor": "#ffffff" if style.hollow else style.colour,
+    }  # fmt: skip
+    axes.plot([], [], linewidth=style.width, label=label, **look)
+    if curve.x.size > 1:
+        first, span = float(curve.x[0]), float(curve.x[-1] - curve.x[0])
+        shift = (0.5 + MARKS.index(style.mark)) / len(MARKS)
+        at = [int(np.searchsorted(curve.x, first + span * (i + shift) / MARKED)) for i in range(MARKED)]
+        axes.plot(curve.x[at], curve.y[at], linestyle="", label="_", zorder=2.5, **look)
+
+
+def _plain_ticks(axis: Any, low: float, high: float) -> None:
     """1, 2 and 5 of each decade, or even steps where they are fewer than three: matplotlib's own labels overlap."""
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     ticks = [m * 10.0**d for d in decades for m in (1, 2, 5) if low * 0.999 <= m * 10.0**d <= high * 1.001]
@@ -339,8 +338,8 @@ def _plain_ticks(axes: Any, low: float, high: float) -> None:
         from matplotlib.ticker import MaxNLocator
 
         ticks = [t for t in MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, high) if low <= t <= high]
-    axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
-    axes.set_xticks([], minor=True)
+    axis.set_ticks(ticks, [f"{t:g}" for t in ticks])
+    axis.set_ticks([], minor=True)
 
 
 def _fill(axes: Any, panel: Panel, bare: bool) -> None:
@@ -350,17 +349,22 @@ def _fill(axes: Any, panel: Panel, bare: bool) -> None:
         _line(axes, curve)
     low, high = panel.x_limits or axes.get_xlim()
     if panel.x_scale == "log" and high < 300.0 * low:
-        _plain_ticks(axes, low, high)
+        _plain_ticks(axes.xaxis, low, high)
         axes.set_xlim(low, high)  # Ticks may have widened it.
     elif panel.x_scale == "log":
         # Decades as 0.01, not as powers of ten, whose typesetting takes as long as the rest of the picture.
         axes.xaxis.set_major_formatter("{x:g}")
+    bottom, top = panel.y_limits or axes.get_ylim()
+    if panel.y_scale == "log" and not panel.y_names and top < 300.0 * bottom:
+        _plain_ticks(axes.yaxis, bottom, top)
+        axes.set_ylim(bottom, top)
     if panel.y_names:
         axes.set_yticks(range(len(panel.y_names)), panel.y_names)
         axes.set_ylim(len(panel.y_names) - 0.5, -0.5)
         axes.grid(visible=False, axis="y")
     axes.set_ylabel(panel.y_label)
-    axes.yaxis.set_label_coords(-0.122, 0.5)
+    # A label of two lines begins nearer to the axis, where its second line ends.
+    axes.yaxis.set_label_coords(-0.122 if "\n" not in panel.y_label else -0.095, 0.5)
     if panel.x_limits:
         axes.set_xlim(*panel.x_limits)
     if panel.y_limits:

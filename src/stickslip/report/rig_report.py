@@ -14,7 +14,8 @@ from stickslip.errors import unwritable
 from stickslip.report.conclusions import rig_conclusion
 from stickslip.report.html import image
 from stickslip.report.page import filled, replaced
-from stickslip.report.plots import REFERENCE, Curve, Panel, draw, envelope, style_of
+from stickslip.report.plots import Curve, Panel, draw, envelope
+from stickslip.report.styles import REFERENCE, style_of
 from stickslip.study.experiments import Experiment, ExperimentView, experiments_of
 from stickslip.study.result import Run, StudyResult
 from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share
@@ -45,23 +46,37 @@ def draw_experiments(result: StudyResult, folder: Path) -> list[dict[str, Any]]:
 
 def _drawn(one: Experiment, runs: Mapping[str, Run], stem: Path) -> dict[str, Any]:
     linear = [n for n in runs if "-" not in n]
-    kinds = {"FF": "feedforward", "FB": "feedback", "": "others"}
-    groups: dict[str, list[str]] = {kind: [] for kind in kinds}
+    groups: dict[str, list[str]] = {kind: [] for kind in KINDS}
     for name in runs:
         if name not in linear:
-            groups[name[:2] if name[:2] in kinds else ""].append(name)
+            groups[name[:2] if name[:2] in KINDS else ""].append(name)
     panels = [
-        _panel(one, {n: runs[n] for n in (*linear, *names)}, kinds[kind])
+        _panel(one, {n: runs[n] for n in (*linear, *names)}, KINDS[kind])
         for kind, names in groups.items()
         if names
     ]
     best = min(runs, key=lambda name: runs[name].metrics["position_rms_rad"])
     rms = 1e3 * runs[best].metrics["position_rms_rad"]
-    title = f"{one.machine}, {one.reference}, {one.linear} {one.bandwidth:g} Hz"
+    title = f"Machine {one.machine}, reference {one.reference}, {one.linear} of {one.bandwidth:g} Hz"
     title += f" (thesis figures {' and '.join(one.figures)})" if one.figures else ""
-    message = f"least RMS error: {best}, {rms:.3g} mrad"
+    message = f"Least RMS error: {worded(best)}, {rms:.3g} mrad"
     draw(stem, title, message, panels, 2.1)
     return {"id": one.name, "title": title, "caption": message, **image(stem)}
+
+
+KINDS = {"FF": "feedforward", "FB": "feedback", "": "others"}
+
+
+def labelled(name: str) -> str:
+    """A controller as the legend names it: its law, and the low-pass on the velocity that it sees."""
+    law = name.removeprefix("FF-").removeprefix("FB-")
+    return "gms, 10 Hz filter" if law == "gms10" else law
+
+
+def worded(name: str) -> str:
+    """A controller in words: its law and how it compensates."""
+    kind = KINDS.get(name[:2], "") if "-" in name else ""
+    return f"{labelled(name)} {kind}".strip()
 
 
 def _panel(one: Experiment, runs: Mapping[str, Run], note: str) -> Panel:
@@ -76,13 +91,13 @@ def _panel(one: Experiment, runs: Mapping[str, Run], note: str) -> Panel:
         inside = (time >= start) & (time <= end)
         if not np.any(inside):
             continue
-        if name == list(runs)[-1]:  # over the others
-            reference = Curve(*envelope(time[inside], goal[inside]), "reference", REFERENCE)
+        if name == list(runs)[-1]:  # over the others, but named first
+            curves.insert(0, Curve(time[:0], time[:0], "reference", REFERENCE))
+            reference = Curve(*envelope(time[inside], goal[inside]), "", REFERENCE)
         path = 1e3 * record["position"][inside]
-        style = style_of("gms10" if name.endswith("gms10") else name, ("gms10",))
-        curves.append(
-            Curve(*envelope(time[inside], path, 260), name.removeprefix("FF-").removeprefix("FB-"), style)
-        )
+        # One legend serves both panels: a law looks the same in feedforward and feedback.
+        style = style_of(name.removeprefix("FF-").removeprefix("FB-"))
+        curves.append(Curve(*envelope(time[inside], path, 260), labelled(name), style))
     curves += [reference] if reference else []
     ends = (float(np.min(goal)), float(np.max(goal)))
     margin = 0.45 * (ends[1] - ends[0])

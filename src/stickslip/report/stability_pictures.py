@@ -10,7 +10,8 @@ import numpy as np
 from stickslip.analyse.controller_margins import ControllerStability
 from stickslip.analyse.stability import SLOW
 from stickslip.analyse.stability_result import FILTERS, GAINS, TIMES, Map, Stability
-from stickslip.report.plots import Curve, Panel, Style
+from stickslip.report.plots import Curve, Panel
+from stickslip.report.styles import Style
 from stickslip.study.stability_map import FINE, FINE_GAINS, OPEN, Confirmed
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.report.plots import LEGEND, WIDTH, Curve, Panel, Style, tied
+from stickslip.report.plots import LEGEND, WIDTH, Curve, Panel, tied
+from stickslip.report.styles import Style
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Points = Callable[[Array], Array]

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.report.plots import Curve, Panel, Style, scaled, style_of
+from stickslip.report.plots import Curve, Panel, one_prefix, scaled
 from stickslip.report.plots import draw as draw_panels
+from stickslip.report.styles import Style, styles_of
+from stickslip.report.swept_names import metric_named, number_named
 from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.dataset import read
 from stickslip.sweep.gains import GAIN, recommended
@@ -26,13 +28,8 @@ KINDS = ("percentiles", "gain", "uncertainty", "tornado")
 """What the names of the figures begin with."""
 BAND = Style("#0072B2", "-", 4.0)
 MEDIAN = Style("#000000", "-", 1.0)
+ALL = Style("#000000", "-", 0.8)
 LOWER, HIGHER = Style("#0072B2", "-", 4.0), Style("#E69F00", "-", 4.0)
-WORDS = {
-    "position_rms": "RMS position error", "position_peak": "peak position error",
-    "second_half_position_rms": "RMS position error, second half", "velocity_rms": "RMS velocity error",
-    "torque_rms": "RMS motor torque",
-}  # fmt: skip
-UNITS = {"rad_s": "rad/s", "rad": "rad", "Nm": "N·m", "J": "J", "s": "s"}
 
 
 def draw(folder: Path, sweep: Sweep) -> list[Path]:
@@ -57,13 +54,14 @@ def draw(folder: Path, sweep: Sweep) -> list[Path]:
     return made
 
 
-def named(metric: str) -> tuple[str, str]:
-    """A metric in words, and its unit."""
-    for ending, unit in UNITS.items():
-        if metric.endswith(f"_{ending}"):
-            short = metric.removesuffix(f"_{ending}")
-            return WORDS.get(short, short.replace("_", " ")), unit
-    return metric.replace("_", " "), "-"
+def ordinal(number: float) -> str:
+    """A percentile's rank in words, 90th or 97.5th."""
+    ending = {1: "st", 2: "nd", 3: "rd"}.get(int(number) % 10, "th") if float(number).is_integer() else "th"
+    return f"{number:g}{ending}"
+
+
+def _sentence(words: str) -> str:
+    return words[0].upper() + words[1:]
 
 
 def _columns(folder: Path, sweep: Sweep, run: PlannedRun) -> tuple[list[Array], Array]:
@@ -83,7 +81,7 @@ def _saved(stem: Path, title: str, message: str, panels: list[Panel], height: fl
 
 def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Path | None:
     """Percentiles over the uncertainty; None where the cases are too few for one."""
-    what, unit = named(sweep.metrics[0])
+    what, unit = metric_named(sweep.metrics[0])
     data: dict[str, tuple[Array, Array]] = {}
     for run in runs:
         drawn, values = _columns(folder, sweep, run)
@@ -92,29 +90,27 @@ def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun])
     lines = {name: within(levels, off, values, HIGH) for name, (off, values) in data.items()}
     if not any(np.any(np.isfinite(y)) for y in lines.values()):
         return None
-    factor, shown = scaled(
-        max(_or_zero(float(np.max(y[np.isfinite(y)], initial=0.0))) for y in lines.values()), unit
-    )
-    label = f"95th percentile ({shown})"
+    largest = max(_or_zero(float(np.max(y[np.isfinite(y)], initial=0.0))) for y in lines.values())
+    factor, shown = scaled(largest, unit)
+    label = f"{what},\n95th percentile ({shown})"
     percent = 100.0 * widest(sweep.drawn.spreads)
-    families = {"feedforward": "FF-", "feedback": "FB-"}
+    kinds = {run.controller: run.compensation for run in runs}
+    linear = [n for n in lines if not kinds[n]]
     panels: list[Panel] = []
-    for family, prefix in families.items():
-        members = [n for n in lines if n.startswith(prefix)]
-        rest = [n for n in lines if not n.startswith(tuple(families.values()))]
-        if members:
-            panels.append(_lines(percent * levels, lines, [*rest, *members], factor, label, family))
+    for kind in ("feedforward", "feedback"):
+        if members := [n for n in lines if kinds[n] == kind]:
+            panels.append(_lines(percent * levels, lines, [*linear, *members], factor, label, kind))
     if not panels:
-        panels.append(_lines(percent * levels, lines, list(lines), factor, label, ""))
+        panels.append(_lines(percent * levels, lines, linear, factor, label, ""))
     message = (
-        f"{_choice(lines, percent)} 95th percentile of the {what} over {sweep.drawn.cases} cases, "
-        "every number that varies anywhere within that distance"
+        f"{_choice(lines, [n for n in lines if kinds[n]], percent)} {sweep.drawn.cases} cases; all parameters vary "
+        "together, each within ± its error"
     )
     return _saved(stem, sweep.title, message, panels, 2.3)
 
 
-def _choice(lines: dict[str, Array], percent: float) -> str:
-    """Which controller to choose, in words: all of them, and those that compensate."""
+def _choice(lines: dict[str, Array], compensated: list[str], percent: float) -> str:
+    """Which controller to choose, in words: of all of them, and of those that compensate."""
 
     def best(names: list[str]) -> str:
         each = {i: min(names, key=lambda n: _or_inf(lines[n][i])) for i in known}
@@ -125,12 +121,11 @@ def _choice(lines: dict[str, Array], percent: float) -> str:
         since = min(i for i in known if all(each[j] == last for j in known if j >= i))
         return (
             f"{first} up to ±{percent * (until + 1) / LEVELS:.0f} %,"
-            f" {last} from ±{percent * (since + 1) / LEVELS:.0f} % on"
+            f" {last} from ±{percent * (since + 1) / LEVELS:.0f} %"
         )
 
     known = [i for i in range(LEVELS) if any(math.isfinite(y[i]) for y in lines.values())]
-    said = f"Least error: {best(list(lines))}"
-    compensated = [n for n in lines if n.startswith(("FF-", "FB-"))]
+    said = f"Lowest: {best(list(lines))}"
     return (
         f"{said}; of the compensators: {best(compensated)}."
         if 0 < len(compensated) < len(lines)
@@ -141,9 +136,9 @@ def _choice(lines: dict[str, Array], percent: float) -> str:
 def _lines(
     levels: Array, lines: dict[str, Array], names: list[str], factor: float, label: str, note: str
 ) -> Panel:
-    curves = [Curve(levels, factor * lines[n], n, style_of(n, list(lines))) for n in names]
-    curves.sort(key=lambda c: c.style.dashes != "-")  # whole lines below: broken ones show where they agree
-    return Panel(curves, label, "uncertainty of what varies (±%)", note=note, y_scale="log")
+    styles = styles_of(list(lines))
+    curves = [Curve(levels, factor * lines[n], n, styles[n]) for n in names]
+    return Panel(curves, label, "parameter error (±%)", note=note, y_scale="log")
 
 
 def _or_zero(value: float) -> float:
@@ -158,7 +153,7 @@ def _or_inf(value: float) -> float:
 
 
 def _percentiles(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Path:
-    what, unit = named(sweep.metrics[0])
+    what, unit = metric_named(sweep.metrics[0])
     rows = [np.asarray(_columns(folder, sweep, run)[1]) for run in runs]
     none = np.full(3, np.nan)
     finite = [v[np.isfinite(v)] for v in rows]
@@ -170,12 +165,14 @@ def _percentiles(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun])
         low, middle, high = factor * spans[i]
         at = np.array([float(place), float(place)])
         curves.append(
-            Curve(np.array([low, high]), at, "5 % to 95 % of the cases" if place == 0 else "", BAND)
+            Curve(np.array([low, high]), at, "5th to 95th percentile" if place == 0 else "", BAND, "bar")
         )
         curves.append(
             Curve(np.array([middle]), at[:1], "median" if place == 0 else "", MEDIAN, "points")
         )  # fmt: skip
-    message = f"{what} over {sweep.drawn.cases} cases each; best 95th percentile on top"
+    message = (
+        f"{_sentence(what)} over {sweep.drawn.cases} cases; ordered by the 95th percentile, lowest on top"
+    )
     panel = Panel(curves, "", f"{what} ({shown})", y_names=[runs[i].controller for i in order], x_scale="log")
     return _saved(stem, sweep.title, message, [panel], 0.7 + 0.17 * len(runs))
 
@@ -184,7 +181,7 @@ def _percentiles(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun])
 
 
 def _tornado(stem: Path, folder: Path, sweep: Sweep, run: PlannedRun) -> Path:
-    what, unit = named(sweep.metrics[0])
+    what, unit = metric_named(sweep.metrics[0])
     drawn, values = _columns(folder, sweep, run)
     names = [n for n in sweep.drawn.names if n != LEVEL]
     columns = [c for n, c in zip(sweep.drawn.names, drawn) if n != LEVEL]
@@ -202,54 +199,40 @@ def _tornado(stem: Path, folder: Path, sweep: Sweep, run: PlannedRun) -> Path:
         for end, style, label in ((0, LOWER, "lowest tenth"), (1, HIGHER, "highest tenth")):
             at = np.full(2, place + (0.13 if end else -0.13))
             ends = factor * np.array([middle, pairs[i][end]])
-            curves.append(Curve(ends, at, label if place == 0 else "", style))
+            curves.append(Curve(ends, at, label if place == 0 else "", style, "bar"))
+    curves.append(Curve(np.array([factor * middle]), np.zeros(1), "all cases", ALL, "vertical"))
+    words = [number_named(run, name)[0] for name in names]
     message = (
-        f"{run.controller}: median {what} over the cases with the lowest and the highest tenth of each number; "
-        f"{_symbol(names[order[0]])} matters most"
+        f"{run.controller}: median with one parameter in its lowest or highest tenth, the others anywhere; "
+        f"{words[order[0]]} matters most"
     )
-    panel = Panel(
-        curves, "", f"{what} ({shown})", y_names=[_symbol(names[i]) for i in order]
-    )  # fmt: skip
+    panel = Panel(curves, "", f"median {what} ({shown})", y_names=[words[i] for i in order])
     return _saved(stem, sweep.title, message, [panel], 0.75 + 0.2 * len(pairs))
-
-
-SYMBOLS = {
-    "axis.inertia": "$J$", "friction.fs": "$F_S$", "friction.fc": "$F_C$", "friction.vs": "$v_s$",
-    "friction.sigma2": r"$\sigma_2$", "friction.sigma0": r"$\sigma_0$", "friction.sigma1": r"$\sigma_1$",
-    "friction.c": "$C$", "controller.gain": "gain", "controller.bandwidth_hz": "bandwidth",
-}  # fmt: skip
-
-
-def _symbol(name: str) -> str:
-    """A number as the field writes it."""
-    return SYMBOLS.get(name, name)
 
 
 # ---- which gain -------------------------------------------------------------------------------------------------
 
 
 def _gains(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Path | None:
-    what, unit = named(sweep.metrics[0])
+    what, unit = metric_named(sweep.metrics[0])
     helped = [run for run in runs if run.control.is_short and run.control.compensator]
     found = {run.controller: recommended(folder, sweep, run) for run in helped}
     found = {name: choice for name, choice in found.items() if choice.gains.size}
     if not found:
         return None
     factor, shown = scaled(max(float(np.nanmax(c.high)) for c in found.values()), unit)
-    names = list(found)
-    curves = [Curve(c.gains, factor * c.high, n, style_of(n, names)) for n, c in found.items()]
-    marks = [
-        Curve(np.array([c.gain]), factor * np.array([c.least]), "", style_of(n, names), "points")
-        for n, c in found.items()
+    styles = styles_of([run.controller for run in runs])
+    curves = [Curve(c.gains, factor * c.high, n, styles[n]) for n, c in found.items()]
+    best = [
+        Curve(np.array([c.gain]), factor * np.array([c.least]), "lowest", ALL, "points")
+        for c in found.values()
     ]
-    said = ", ".join(f"{n} {c.gain:.2f}" for n, c in found.items())
-    panels = [Panel([*curves, *marks], f"95th percentile ({shown})", "gain of the compensator")]
+    said = ", ".join(f"{n}\u00a0{c.gain:.2f}" for n, c in found.items())
+    label = f"{what},\n95th percentile ({shown})"
+    panels = [Panel([*curves, *best], label, "compensator gain (-)")]
     width = max(c.width for c in found.values())
-    steps = f" (steps of {width:.2g})" if width else ""
-    message = (
-        f"recommended gain, at which the 95th percentile of the {what} over {sweep.drawn.cases} cases is least{steps}: "
-        f"{said}"
-    )
+    steps = f"; resolution {width:.2g}" if width else ""
+    message = f"Best gain: {said} ({sweep.drawn.cases} cases{steps})"
     return _saved(stem, sweep.title, message, panels, 2.1)
 
 
@@ -258,19 +241,28 @@ def _gains(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Pa
 
 def trade_off(stem: Path, sweep: Sweep, tuned: Tuned) -> Path:
     """Draw the first two metrics of every setting tried, and those that no other beats. Returns the PNG file."""
-    (what, unit), (price, price_unit) = (named(name) for name in sweep.metrics[:2])
+    (what, unit), (price, price_unit) = (metric_named(name) for name in sweep.metrics[:2])
     scores = tuned.scores[np.all(np.isfinite(tuned.scores), axis=1)]
-    x, x_shown = scaled(float(np.percentile(scores[:, 0], 90)), unit)
-    y, y_shown = scaled(float(np.percentile(scores[:, 1], 90)), price_unit)
+    usual = [float(np.percentile(scores[:, i], 90)) for i in (0, 1)]
+    x, x_shown = scaled(usual[0], unit)
+    y, y_shown = scaled(usual[1], price_unit)
+    if unit == price_unit:
+        x, prefix = one_prefix(*usual)
+        y, x_shown, y_shown = x, prefix + unit, prefix + unit
     best = front(scores)
     curves = [
         Curve(x * scores[:, 0], y * scores[:, 1], "settings tried", Style("#999999"), "open points"),
-        Curve(x * scores[best, 0], y * scores[best, 1], "not beaten in both", Style("#0072B2", "-", 1.2, "o")),
-        Curve(x * tuned.scores_before[:1], y * tuned.scores_before[1:2], "as it was", Style("#D55E00"), "points"),
+        Curve(x * scores[best, 0], y * scores[best, 1], "best compromises", Style("#0072B2", "-", 1.2, "o")),
+        Curve(x * tuned.scores_before[:1], y * tuned.scores_before[1:2], "before", Style("#D55E00"), "points"),
         Curve(x * tuned.scores_after[:1], y * tuned.scores_after[1:2], "chosen", Style("#000000"), "points"),
     ]  # fmt: skip
-    chosen = ", ".join(f"{_symbol(n)} {v:.3g}" for n, v in zip(tuned.names, tuned.after))
-    over = f"{sweep.percentile:g}th percentiles over {sweep.drawn.cases} cases each"
-    message = f"{tuned.run.controller}: {chosen}; {over}"
-    panel = Panel(curves, f"{price} ({y_shown})", f"{what} ({x_shown})", x_scale="log")
+    chosen = ", ".join(
+        f"{words} {before:.3g} to {after:.3g} {own}".rstrip()
+        for (words, own), before, after in zip(
+            [number_named(tuned.run, n) for n in tuned.names], tuned.before, tuned.after, strict=True
+        )
+    )
+    rank = f"{ordinal(sweep.percentile)} percentile of {sweep.drawn.cases} cases"
+    message = f"{tuned.run.controller}: {chosen}. Axes: {rank}"
+    panel = Panel(curves, f"{price} ({y_shown})", f"{what} ({x_shown})", x_scale="log", y_scale="log")
     return _saved(stem, sweep.title, message, [panel], 2.4)

@@ -137,6 +137,7 @@ def find_run(folder: Path, planned: PlannedRun) -> Run | None:
     return Run(
         planned.slip_rule, planned.reference, planned.friction, planned.controller,
         meta.get("metrics", {}), path, about["failure"], about["seconds"], depends_on_start(meta),
+        planned.compensation,
     )  # fmt: skip
 
 

@@ -24,6 +24,8 @@ from stickslip.study.provenance import engine_hash, source_hash
 
 OWN = "own"
 """What stands for the slip rule in the name of a run whose laws keep rules of their own."""
+INERTIA = "inertia_feedforward"
+"""The feedforward that compensates no friction."""
 FAMILIES = ("slip_rule", "reference", "friction", "controller")
 
 
@@ -68,6 +70,16 @@ class PlannedRun:
     def names(self) -> Mapping[str, str]:
         """Its name in every family of names, by which `stickslip study --only` finds it."""
         return {family: getattr(self, family) for family in FAMILIES}
+
+    @property
+    def compensation(self) -> str:
+        """How the controller compensates friction: ``"feedforward"`` on the reference, ``"feedback"`` on what is
+        measured (observers, and loops that are not linear), or ``""`` for a linear controller alone."""
+        laws = [block.law for block in self.control.blocks.values()]
+        if any(law.place == "observer" or (law.place == "loop" and not law.is_linear) for law in laws):
+            return "feedback"
+        ahead = any(law.place == "feedforward" and law.name != INERTIA for law in laws)
+        return "feedforward" if ahead else ""
 
     @property
     def rule(self) -> str | None:

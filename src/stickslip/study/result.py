@@ -38,6 +38,8 @@ class Run:
     depends_on_start : bool
         Whether a start 1e-9 rad beside takes another branch of the motion (`stickslip.simulation.accuracy`), so that
         its metrics are those of one branch; False where another integrator than the exact one ran it.
+    compensation : str
+        How the controller compensates friction, as `stickslip.study.planned_run.PlannedRun.compensation` says.
     """
 
     slip_rule: str
@@ -49,6 +51,7 @@ class Run:
     failure: str = ""
     seconds: float = 0.0
     depends_on_start: bool = False
+    compensation: str = ""
 
     @property
     def case(self) -> str:

@@ -168,4 +168,5 @@ def _run_and_keep(planned: PlannedRun, folder: Path) -> Run:
     return Run(
         planned.slip_rule, planned.reference, planned.friction, planned.controller,
         executed.metrics, path, executed.failure, executed.seconds, files.depends_on_start(record.meta),
+        planned.compensation,
     )  # fmt: skip

@@ -177,13 +177,14 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
 
 
 def _title(name: str, study: Study, drawn: Drawn, tuned: Sequence[Spread]) -> str:
-    """What a sweep without a title of its own does."""
+    """What a sweep without a title of its own does; its figures name the numbers."""
 
-    def listed(names: Sequence[str]) -> str:
-        return f"{', '.join(names[:4])}{f' and {len(names) - 4} more' if len(names) > 4 else ''}"
+    def counted(count: int, word: str) -> str:
+        return f"{count} {word}{'' if count == 1 else 's'}"
 
-    varied = f"{listed([n for n in drawn.names if n != LEVEL])} varied in study {study.name}"
-    return f"{name}: {f'{listed([s.name for s in tuned])} tuned, ' if tuned else ''}{varied}"
+    varied = f"{counted(sum(n != LEVEL for n in drawn.names), 'parameter')} of study {study.name} varied"
+    own = f"{counted(len(tuned), 'setting')} tuned, " if tuned else ""
+    return f"{name}: {own}{varied}"
 
 
 def _lanes(table: Table, metrics: Sequence[str]) -> tuple[float, str]:

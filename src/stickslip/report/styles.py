@@ -1,0 +1,96 @@
+"""How lines look: a controller or law has one colour and one mark, in all figures of studies and sweeps.
+
+Lines of controllers are whole, never dashed: dashes of a line that oscillates are noise. Marks at a few places
+distinguish lines in print without colour, and show lines that lie on each other.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+MARKS = "osD^vP>X<*ph"
+"""The marks; the place of a mark here says where along its line it stands, so that lines on each other show both."""
+
+
+@dataclass(frozen=True)
+class Style:
+    """Colour (Okabe-Ito, safe for the colour-blind), dashes, width (points) and marker of a line.
+
+    Attributes
+    ----------
+    marker : str
+        At every point.
+    mark : str
+        At a few places along the line, one of `MARKS`.
+    hollow : bool
+        Whether the mark is white inside.
+    """
+
+    colour: str
+    dashes: Any = "-"
+    width: float = 1.1
+    marker: str = ""
+    mark: str = ""
+    hollow: bool = False
+
+
+REFERENCE = Style("#000000", (0, (1, 1.5)), 1.3)
+LAST = Style("#777777", width=0.6)
+"""Of names beyond a hundred."""
+LAWS = {
+    "coulomb": Style("#E69F00", width=0.9, mark="o"),
+    "stribeck": Style("#56B4E9", width=0.9, mark="s"),
+    "lugre": Style("#009E73", width=0.9, mark="^"),
+    "gms": Style("#0072B2", width=0.9, mark="D"),
+}
+LINEAR = {
+    "PD": Style("#777777", width=1.4),
+    "PID": Style("#CC79A7", width=0.9, mark="v"),
+    "PR": Style("#D55E00", width=0.9, mark=">"),
+}
+SPARE = ("#D55E00", "#0072B2", "#56B4E9", "#009E73", "#E69F00", "#CC79A7")
+"""The colours of other names, in the order in which they are taken."""
+SPARE_MARKS = "P<X*hposD^v>"
+
+
+def styles_of(names: Sequence[str]) -> dict[str, Style]:
+    """A style for every controller of a study, no two the same.
+
+    A law's colour and mark follow its name wherever it stands, hollow for feedback (``FB-``). The other names take the
+    colours in turn, first those that no known name has, never a linear controller's, beside which all are drawn.
+    """
+    styles: dict[str, Style] = {}
+    for name in names:
+        if (known := _known_style(name)) and known not in styles.values():
+            styles[name] = known
+    linear = {style.colour for name, style in styles.items() if name in LINEAR}
+    taken = {style.colour for style in styles.values()}
+    colours = sorted((c for c in SPARE if c not in linear), key=lambda colour: colour in taken)
+    count = len(SPARE_MARKS)
+    looks = itertools.product((False, True), range(count), enumerate(colours))
+    # Names beside each other differ in colour and in mark: five steps on lead through all marks.
+    spares = (
+        Style(colour, width=0.9, mark=SPARE_MARKS[(place + 5 * turn) % count], hollow=hollow)
+        for hollow, turn, (place, colour) in looks
+    )
+    for name in names:
+        if name not in styles:
+            styles[name] = next((s for s in spares if s not in styles.values()), LAST)
+    return {name: styles[name] for name in names}
+
+
+def style_of(name: str, others: Sequence[str] = ()) -> Style:
+    """The style of a controller or law among others, by `styles_of`."""
+    return styles_of(list(dict.fromkeys([*others, name])))[name]
+
+
+def _known_style(name: str) -> Style | None:
+    """Of a linear controller, or of the law that a name ends with."""
+    if name in LINEAR:
+        return LINEAR[name]
+    kind, _, law = name.rpartition("-")
+    style = LAWS.get(law)
+    return replace(style, hollow=True) if style and kind == "FB" else style

@@ -1,0 +1,82 @@
+"""The metrics and numbers of a sweep as the field writes them: symbols, words and units."""
+
+from __future__ import annotations
+
+import re
+
+from stickslip.spec import Field
+from stickslip.study.planned_run import PlannedRun
+from stickslip.sweep.numbers import parts
+
+METRICS = {
+    "position_rms": "RMS position error", "position_peak": "peak position error",
+    "second_half_position_rms": "RMS position error, second half", "velocity_rms": "RMS velocity error",
+    "velocity_peak": "peak velocity error", "torque_rms": "RMS motor torque", "torque_peak": "peak motor torque",
+    "steady_state_error": "steady-state error", "settling": "settling time",
+    "velocity_above_50Hz_rms": "RMS velocity above 50 Hz", "longest_standstill": "longest standstill",
+    "limit_cycle_amplitude": "limit cycle amplitude", "limit_cycle_period": "limit cycle period",
+    "reversals_beyond_reference": "extra reversals", "second_half_reversals": "reversals, second half",
+}  # fmt: skip
+UNITS = {"per_s": "1/s", "rad_s": "rad/s", "rad": "rad", "Nm": "N·m", "J": "J", "s": "s"}
+CONTROLLER = {
+    "gain": ("compensator gain", ""), "filter_hz": ("compensator filter", "Hz"), "bandwidth_hz": ("bandwidth", "Hz"),
+    "damping": ("damping ratio", ""), "kp": ("$k_p$", "N·m/rad"), "ki": ("$k_i$", "N·m/(rad·s)"),
+    "kd": ("$k_d$", "N·m·s/rad"), "kr": ("$k_r$", "N·m·s/rad"), "torque_limit": ("torque limit", "N·m"),
+    "sample_time": ("sample time", "s"),
+}  # fmt: skip
+GREEK = ("alpha", "beta", "gamma", "delta", "kappa", "lambda", "phi", "sigma", "tau", "theta")
+SYMBOL = re.compile(rf"([A-Za-z]|{'|'.join(GREEK)})(?:_([A-Za-z0-9,]+))?")
+BELIEVED = {"law": ", model", "reference": ", reference"}
+"""What is added to the names of numbers that are not the machine's."""
+
+
+def metric_named(metric: str) -> tuple[str, str]:
+    """A metric in words, and its unit."""
+    for ending, unit in UNITS.items():
+        if metric.endswith(f"_{ending}"):
+            short = metric.removesuffix(f"_{ending}")
+            return METRICS.get(short, short.replace("_", " ")), unit
+    return metric.replace("_", " "), "-"
+
+
+def number_named(run: PlannedRun, name: str) -> tuple[str, str]:
+    """A number of a run by its symbol or in words, and its unit, "" without one.
+
+    Parameters
+    ----------
+    run : PlannedRun
+    name : str
+        As a sweep's file names it: ``friction.fs``, ``controller.bandwidth_hz``, ``friction.k[0]``.
+    """
+    family, rest, element = parts(name)
+    place = "" if element is None else f", element {element + 1}"
+    if name == "axis.inertia":
+        return "$J$", "kg·m²"
+    if family == "controller" and rest in CONTROLLER:
+        return CONTROLLER[rest]
+    if field := next((f for f in _fields(run, family) if f.name == rest), None):
+        unit = "" if field.par.unit == "-" else field.par.unit
+        words = symbol(field.par.symbol) if field.par.symbol else rest.replace("_", " ")
+        return words + place + BELIEVED.get(family, ""), unit
+    return rest.replace("_", " ").replace(".", " "), ""
+
+
+def symbol(written: str) -> str:
+    """A law's symbol, ``sigma_0``, as a figure typesets it."""
+    match = SYMBOL.fullmatch(written)
+    if match is None:
+        return written.replace("$", "")
+    stem = f"\\{match[1]}" if match[1] in GREEK else match[1]
+    return f"${stem}_{{{match[2]}}}$" if match[2] else f"${stem}$"
+
+
+def _fields(run: PlannedRun, family: str) -> tuple[Field, ...]:
+    """The described numbers of a family."""
+    if family == "friction":
+        return tuple(run.axis.friction.law.fields)
+    if family == "law" and run.control.is_short and run.control.compensator:
+        return tuple(run.control.compensator.model.law.fields)
+    if family == "reference":
+        return tuple(run.motion.kind.fields)
+    # Of a controller's laws the symbols are one law's own: the whole name says whose a number is.
+    return ()
