@@ -54,12 +54,6 @@ def draw(folder: Path, sweep: Sweep) -> list[Path]:
     return made
 
 
-def ordinal(number: float) -> str:
-    """A percentile's rank in words, 90th or 97.5th."""
-    ending = {1: "st", 2: "nd", 3: "rd"}.get(int(number) % 10, "th") if float(number).is_integer() else "th"
-    return f"{number:g}{ending}"
-
-
 def _sentence(words: str) -> str:
     return words[0].upper() + words[1:]
 
@@ -262,7 +256,7 @@ def trade_off(stem: Path, sweep: Sweep, tuned: Tuned) -> Path:
             [number_named(tuned.run, n) for n in tuned.names], tuned.before, tuned.after, strict=True
         )
     )
-    rank = f"{ordinal(sweep.percentile)} percentile of {sweep.drawn.cases} cases"
+    rank = f"percentile {sweep.percentile:g} over {sweep.drawn.cases} cases"
     message = f"{tuned.run.controller}: {chosen}. Axes: {rank}"
     panel = Panel(curves, f"{price} ({y_shown})", f"{what} ({x_shown})", x_scale="log", y_scale="log")
     return _saved(stem, sweep.title, message, [panel], 2.4)
