@@ -252,7 +252,10 @@ class Table:
         if value not in names:
             define = f"define it in a table [{family}.{value if BARE_KEY.fullmatch(value) else 'NAME'}]"
             either = f"choose from {', '.join(names)}, or {define}" if names else define
-            raise self.error(key, f"is not known; {suggestion(value, names, either if family else '')}")
+            remedy = suggestion(value, names, either if family else "")
+            if isinstance(self.values.get(key), list):  # of several entries the one that is meant
+                raise ConfigError(f"{self.label(key)}: {value!r} is not known; {remedy}")
+            raise self.error(key, f"is not known; {remedy}")
         return value
 
     def table(self, key: str) -> Table:

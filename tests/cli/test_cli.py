@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import resource
 import shutil
 import signal
@@ -192,6 +193,40 @@ def test_an_interruption_says_how_to_go_on(
     assert streams.err.count("\n") == 1
     assert "finished runs are kept in study-small_study; run the same command again" in streams.err
     assert len(list(folder.rglob("*.npz"))) == 2
+    monkeypatch.setattr(studies, "execute", real)
+    assert main(["study", "small_study.toml", "--no-report"]) == 0
+    assert re.search(r"stickslip: 2 of \d+ runs were already done; going on\n", capsys.readouterr().err)
+
+
+def test_a_sweep_that_is_interrupted_while_it_is_timed_says_how_to_go_on(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    from stickslip.sweep import forecast
+
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(forecast, "paces_of", interrupted)
+    assert main(["sweep", "thesis-robustness", "--cases", "500", "--out", str(tmp_path / "out")]) == 130
+    assert "run the same command again to resume" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["study", "thesiss"], "unknown study 'thesiss'; did you mean 'thesis'"),
+        (["study", "nothing"], "unknown study 'nothing'; give the path of a TOML file, or one of thesis,"),
+        (
+            ["sweep", "thesis-robustnes"],
+            "unknown sweep 'thesis-robustnes'; did you mean 'thesis-robustness'?",
+        ),
+    ],
+)
+def test_a_misspelt_study_is_named_with_the_one_that_is_meant(
+    given: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(given) == 2
+    assert said in capsys.readouterr().err
 
 
 @pytest.mark.slow

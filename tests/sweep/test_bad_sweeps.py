@@ -21,6 +21,11 @@ from support.sweeps import SMALL
     [
         ("scale = [0.8, 1.2]", "scale = [1.2, 0.8]", "is empty; give .low, high."),
         ("scale = [0.8, 1.2]", "scale = [1.2, 1.2]", "is empty"),
+        (
+            '"velocity_rms_rad_s"]',
+            '"velocity_rms"]',
+            "metrics: 'velocity_rms' is not known; did you mean 'velocity_rms_rad_s'",
+        ),
         ("scale = [0.8, 1.2]", "scale = []", r"scale = \[\] must be two numbers, \[low, high\]"),
         ("scale = [0.8, 1.2]", "scale = 1.2", r"scale = 1.2 must be two numbers"),
         ("scale = [0.8, 1.2]", "scale = [1, 2, 3]", r"scale = \[1, 2, 3\] must be two numbers"),

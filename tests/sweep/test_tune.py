@@ -207,6 +207,15 @@ def test_a_controller_is_tuned_on_a_machine_whose_delay_is_uncertain(tmp_path):
     assert 0.2 <= delays.min() < delays.max() <= 0.8
 
 
+def test_an_interrupted_tuning_says_that_it_starts_over(tmp_path, capsys, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(tuning, "measured", interrupted)
+    assert main(["tune", str(SMALL), "--out", str(tmp_path / "out")]) == 130
+    assert "are not kept; run the same command again to start over" in capsys.readouterr().err
+
+
 def test_what_cannot_be_tuned(tmp_path, capsys):
     assert main(["sweep", str(SMALL)]) == 2
     assert "stickslip tune" in capsys.readouterr().err

@@ -88,7 +88,7 @@ def _ran(study: Study, only: list[str] | None, args: argparse.Namespace) -> tupl
     out: Path = args.out or Path(f"study-{study.name}")
     try:
         with _output.progress_bar(study.name) as progress:
-            result = studies.run(study, out, only, args.jobs, progress)
+            result = studies.run(study, out, only, args.jobs, progress, _output.warn)
         if args.no_report:
             return result, None
         _output.say("drawing figures ...")

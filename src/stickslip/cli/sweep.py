@@ -81,8 +81,8 @@ def run(args: argparse.Namespace) -> int:
         _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(planned.left_out)}")
     out: Path = args.out or Path(f"sweep-{planned.name}")
     execute.ready(planned, args.scheduler)
-    planned = announced(planned, args.jobs or os.cpu_count() or 1)
     try:
+        planned = announced(planned, args.jobs or os.cpu_count() or 1)
         with _output.progress_bar(planned.name) as progress:
             found = sweep(
                 planned, out, jobs=args.jobs or 0, processes=args.processes, scheduler=args.scheduler,

@@ -51,8 +51,13 @@ def run(args: argparse.Namespace) -> int:
     out: Path = claim_folder(args.out or Path(f"tune-{sweep.name}"), sweep.name, "tune")
     found: list[dict[str, Any]] = []
     for planned in sweep.runs:
-        with _output.progress_bar(planned.key) as progress, interrupts_between_runs(STOPPING) as check:
-            (tuned,) = tune(replace(sweep, runs=[planned]), progress=_stopped_by(progress, check))
+        try:
+            with _output.progress_bar(planned.key) as progress, interrupts_between_runs(STOPPING) as check:
+                (tuned,) = tune(replace(sweep, runs=[planned]), progress=_stopped_by(progress, check))
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(
+                f"the settings tried for {planned.key} are not kept; run the same command again to start over"
+            ) from None
         files = written(out, sweep, tuned, figures=not args.no_report)
         data = tuned.as_dict()
         found.append(data)

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from stickslip.config import Table, read_toml
 from stickslip.control.controller import Controller
-from stickslip.errors import ConfigError, UnknownName
+from stickslip.errors import ConfigError, UnknownName, suggestion
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
@@ -106,8 +106,10 @@ def load(
         return _study(name, Path(__file__).with_name(f"{name}.toml"), _with(given, table))
     path = Path(study)
     if path.suffix != ".toml" and not path.exists():
+        known = (*BUILT_IN, BENCH)
         raise ConfigError(
-            f"unknown study {name!r}; give the path of a TOML file, or one of {', '.join((*BUILT_IN, BENCH))}"
+            f"unknown study {name!r}; "
+            + suggestion(name, known, f"give the path of a TOML file, or one of {', '.join(known)}")
         )
     return _study(path.stem, path, _with(given, read_toml(path, moved=moved)))
 

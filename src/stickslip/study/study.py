@@ -43,6 +43,7 @@ def run(
     only: Sequence[str] | None = None,
     jobs: int = 1,
     progress: Progress | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> StudyResult:
     """Run a study, or find its runs finished, and write metrics.csv, metrics.parquet, records/, manifest.json.
 
@@ -61,6 +62,8 @@ def run(
         Threads; the kernels release the interpreter's lock.
     progress : callable, optional
         ``progress(finished, all)``, called after every run.
+    say : callable, optional
+        ``say(line)``: how many runs were found finished, before the others run.
 
     Raises
     ------
@@ -74,7 +77,7 @@ def run(
     clock, cpu = time.perf_counter(), time.process_time()
     results: dict[str, Run] = {}
     with interrupts_between_runs() as check:
-        for done, finished in enumerate(_finished(wanted, folder, jobs), 1):
+        for done, finished in enumerate(_finished(wanted, folder, jobs, say), 1):
             results[finished.key] = finished
             if progress:
                 progress(done, len(wanted))
@@ -126,7 +129,9 @@ def interrupts_between_runs(said: str = STOPPING) -> Generator[Callable[[], None
             signal.signal(number, handler)
 
 
-def _finished(planned: Sequence[PlannedRun], folder: Path, jobs: int) -> Iterator[Run]:
+def _finished(
+    planned: Sequence[PlannedRun], folder: Path, jobs: int, say: Callable[[str], None] | None
+) -> Iterator[Run]:
     """The runs as they are found or get finished."""
     missing: list[PlannedRun] = []
     for p in planned:
@@ -135,6 +140,9 @@ def _finished(planned: Sequence[PlannedRun], folder: Path, jobs: int) -> Iterato
             yield found
         else:
             missing.append(p)
+    if say and len(missing) < len(planned):
+        more = "; going on" if missing else ""
+        say(f"{len(planned) - len(missing)} of {len(planned)} runs were already done{more}")
     for p in missing:
         p.check()  # Before the first of them runs; laws are compiled here, one after another.
     if jobs == 1:

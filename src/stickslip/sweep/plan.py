@@ -144,7 +144,8 @@ def load(sweep: str | Path, moved: Mapping[str, Path] | None = None) -> Sweep:
     path = Path(__file__).with_name(f"{name}.toml") if name in BUILT_IN else Path(sweep)
     if name not in BUILT_IN and path.suffix != ".toml" and not path.exists():
         raise ConfigError(
-            f"unknown sweep {name!r}; give the path of a TOML file, or one of {', '.join(BUILT_IN)}"
+            f"unknown sweep {name!r}; "
+            + suggestion(name, BUILT_IN, f"give the path of a TOML file, or one of {', '.join(BUILT_IN)}")
         )
     table = read_toml(path, f"{name}.toml" if name in BUILT_IN else "", moved)
     with table:
