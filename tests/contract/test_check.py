@@ -90,7 +90,7 @@ def test_a_right_law_with_a_source_of_its_own_and_a_level_of_products_passes(
     assert not [line for line in lines if line.startswith("FAILED")]
     said = {line[8:26].strip(): line for line in lines}
     assert said["bounded"].startswith("ok")
-    assert "no parameter in N·m tells a level" in said["bounded"]
+    assert "no parameter in N·m gives a level" in said["bounded"]
     assert said["export python"].startswith("ok")
     assert said["export urdf"].startswith("-       export urdf        urdf carries Coulomb")
     assert lines[-1] == "dahl-example: passes what could be tried"

@@ -95,7 +95,7 @@ def test_a_law_without_covariance_tells_no_uncertainty(row):
     controller = ROWS[row]
     values = learned_values(controller, controller.state())
     assert values
-    assert all(v.uncertainty is None and v.text.endswith("; no uncertainty told") for v in values)
+    assert all(v.uncertainty is None and v.text.endswith("; no uncertainty given") for v in values)
     assert not any(v.name.endswith("_known") for v in values)
 
 

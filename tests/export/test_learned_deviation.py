@@ -69,4 +69,4 @@ def test_c_tells_the_deviation_that_python_tells(row, tmp_path):
 def test_a_law_that_tells_none_says_so():
     export = write(ROWS[MAKKAR], "x")
     assert "_deviation" not in export.files["x.h"]
-    assert "no uncertainty told" in export.files["README.md"]
+    assert "no uncertainty given" in export.files["README.md"]

@@ -206,7 +206,7 @@ def test_records_that_cannot_be_used_say_why() -> None:
     forward = Experiment(
         "forward", t, 0.5 * t + 0.05 * np.sin(6.0 * t), np.full(4000, 0.3) + 0.01 * np.cos(6.0 * t)
     )
-    with pytest.raises(InputError, match="effects of fc and offset cannot be told apart"):
+    with pytest.raises(InputError, match="effects of fc and offset cannot be distinguished"):
         inverse_dynamics([forward], AXIS)
     with pytest.raises(InputError, match="too few"):
         Experiment("short", np.arange(10.0), np.zeros(10), np.zeros(10))

@@ -174,7 +174,7 @@ class ControllerStability:
                 else f"sticking, it ends in a cycle of {1e6 * found.amplitude:.0f} µrad at {found.frequency:.0f} Hz"
             )
         elif self.cycle:
-            yield "sticking, the motion grows to where the controller is not linear: where it ends, no poles tell"
+            yield "sticking, the motion grows to where the controller is not linear: poles do not show where it ends"
 
 
 def reach_of(amplitude: float, cycle: Cycle | None) -> float:

@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
+UNBOUNDED = 1e6
+"""Times a value from which on the end of its interval bounds nothing."""
+HUGE = 1e30
+"""The same where the value is 0."""
+NO_LIMIT = "no limit"
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"))
 
 
@@ -13,3 +20,19 @@ def quantity(value: float, unit: str) -> str:
         return f"0 {unit}"
     factor, prefix = next((p for p in PREFIXES if abs(value) * p[0] >= 0.1), PREFIXES[-1])
     return f"{value * factor:.3g} {prefix}{unit}"
+
+
+def ends(value: float, lower: float, upper: float, form: str = ".4g") -> tuple[str, str]:
+    """The ends of an interval; "no limit" for one that is infinite or many decades beyond the value.
+
+    Parameters
+    ----------
+    value, lower, upper : float
+        In one unit.
+    form : str
+        How the ends are written.
+    """
+    most = UNBOUNDED * max(abs(value), min(abs(lower), abs(upper))) or HUGE
+    low = NO_LIMIT if lower < -most or lower == -math.inf else format(lower, form)
+    high = NO_LIMIT if upper > most or upper == math.inf else format(upper, form)
+    return low, high

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from stickslip.analyse.wording import ends
 from stickslip.commission.recommended import NONE_SAFE
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.monte_carlo import sliding_torque
@@ -110,4 +111,4 @@ def with_interval(e: Estimate) -> str:
     """A number with its 95 % interval, or that it is not identified."""
     if not e.identified:
         return f"{e.value:.4g} {e.unit} (not identified)"
-    return f"{e.value:.4g} {e.unit} [{e.lower:.4g}, {e.upper:.4g}]"
+    return f"{e.value:.4g} {e.unit} [{', '.join(ends(e.value, e.lower, e.upper))}]"

@@ -71,7 +71,7 @@ def left_out(soft: Sequence[float], small: Sequence[float]) -> str:
     if small:
         torques = ", ".join(f"{x:.2g} N·m" for x in small)
         parts.append(f"elements of {torques}, less than {100 * LEAST:g} % of the loop's torque")
-    return f"Not in the pre-sliding model, since the loop does not tell their stiffness: {'; '.join(parts)}."
+    return f"Not in the pre-sliding model, since the loop does not determine their stiffness: {'; '.join(parts)}."
 
 
 def scaled(e: Estimate, factor: float) -> Estimate:
@@ -211,7 +211,7 @@ def within_total(found: Identification, spread: float) -> tuple[list[Estimate], 
     out: list[Estimate] = []
     for e, s in zip(own, left.tolist(), strict=True):
         low, high = e.value * math.exp(-1.96 * s), e.value * math.exp(1.96 * s)
-        why = "" if high <= 2.0 * low else "the loop tells the sum of the elements, not each"
+        why = "" if high <= 2.0 * low else "the loop determines the sum of the elements, not each"
         out.append(
             dataclasses.replace(e, std=e.value * s, lower=low, upper=high, identified=not why, verdict=why)
         )

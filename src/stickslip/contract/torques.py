@@ -43,7 +43,7 @@ def bounded(law: Law) -> Verdict:
     levels = (
         ""
         if math.isfinite(level_of(law, law.parameters(dict(law.example))))
-        else "; no parameter in N·m tells a level"
+        else "; no parameter in N·m gives a level"
     )
     return held("bounded", f"{count} random motions of {STEPS} steps: finite, mirrored as declared{levels}")
 

@@ -20,7 +20,7 @@ from stickslip.errors import InputError
 
 WIDTH = 1.96
 """Standard deviations of half an interval that holds 95 of 100 times."""
-SILENT = "no uncertainty told"
+SILENT = "no uncertainty given"
 
 
 @dataclass(frozen=True)

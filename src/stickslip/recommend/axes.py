@@ -37,7 +37,7 @@ WAVELENGTHS = (1e-3, 5e-2)
 WAVES = 3
 """At most so many at once."""
 LEFT = ("sliding_rms_Nm", "sliding_rms_N")
-"""What an identification leaves of the torque where the axis slides for certain: as large they are at most (RMS)."""
+"""What an identification leaves of the torque in gross sliding: as large they are at most (RMS)."""
 BREAKAWAY = (3e-5, 3e-3)
 """rad (a tenth of it in m), displacement at which a contact without springs in its law is taken to break away."""
 LOST = 0.5

@@ -157,8 +157,8 @@ def _none(candidates: Sequence[Candidate], unknown: Sequence[str]) -> Iterator[s
     if unknown and left:
         yield (
             f"On the best estimate {100.0 * min(left):.0f} % of the error would be left; other axes that the "
-            f"record allows decide, since it does not tell {', '.join(unknown)}: what to record for them stands in "
-            "the model file (measure_next)."
+            f"record allows decide, since it does not determine {', '.join(unknown)}: what to record for them is "
+            "listed in the model file (measure_next)."
         )
 
 
@@ -166,7 +166,7 @@ def _simulated(machine: Machine | None) -> str:
     """What was simulated, what was not, and how the interval allows for that."""
     simulated = (
         "Simulated with a rigid axis, a current loop, up to a sample of delay, friction that comes late as "
-        "behind an elastic drivetrain, and torques over the position as large as the model's misfit; resonances, "
+        "behind an elastic drivetrain, and position-dependent torques as large as the model's misfit; resonances, "
         "backlash and noise in the current are not in it (in place of noise a feedback is pushed at rest): for them"
     )
     if machine is not None:

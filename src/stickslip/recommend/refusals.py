@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stickslip.analyse.wording import ends
 from stickslip.errors import InputError
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.identified_file import Identified
@@ -57,7 +58,9 @@ def refuse_unknown(found: Identified) -> None:
     """
     levels = [e for e in found.law_estimates[0] if e.unit in ("N·m", "N")]
     if levels and not any(e.identified or 0.0 < e.upper <= WITHIN * e.lower for e in levels):
-        listed = ", ".join(f"{e.name} {e.value:.3g} [{e.lower:.3g}, {e.upper:.3g}]" for e in levels)
+        listed = ", ".join(
+            f"{e.name} {e.value:.3g} [{', '.join(ends(e.value, e.lower, e.upper, '.3g'))}]" for e in levels
+        )
         why = next((f": {e.verdict}" for e in levels if e.verdict), "")
         raise InputError(
             f"{found.path}: the record does not determine the friction level ({listed} {levels[0].unit}, not "
@@ -81,7 +84,7 @@ def held(found: Identified, alone: Trial | str, drive: Drive, inertia: float | N
             return alone
         alone = f"RMS error {error:.3g} {found.unit('rad')} along a motion of {size:.3g}"
     unsure = [e.name for e in found.estimates if not e.identified]
-    doubt = f", which does not tell {', '.join(unsure)}," if unsure else ""
+    doubt = f", which does not determine {', '.join(unsure)}," if unsure else ""
     raise InputError(
         f"on the axis of {found.path}{doubt} the linear loop alone is unstable: {alone}; "
         + (unsure_inertia(found) if inertia is None else "")
@@ -96,8 +99,9 @@ def unsure_inertia(found: Identified) -> str:
         return ""
     unit, of = found.unit("kg·m²"), "is not identified" if not told.identified else "is hardly determined"
     value = found.axis.get("inertia", told.value)
+    interval = ", ".join(ends(value, told.lower, told.upper, ".3g"))
     return (
-        f"the model's inertia {value:.3g} {unit} {of} [{told.lower:.3g}, {told.upper:.3g}], and the loop may be stable "
+        f"the model's inertia {value:.3g} {unit} {of} [{interval}], and the loop may be stable "
         f"on the axis's own: give that with --inertia in {unit} (Python: inertia=), "
     )
 

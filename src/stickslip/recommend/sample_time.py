@@ -51,7 +51,7 @@ def sample_time_for(
         return machine.sample_time, f"that of the machine {machine.name}"
     period, file = found.sampled
     if not period:
-        return USUAL_TIME, f"assumed, as the model does not tell its record's; {OWN}"
+        return USUAL_TIME, f"assumed, as the model does not contain its record's; {OWN}"
     record = f"the record {file}" if file else "the identified record"
     if period > USUAL_TIME and inertia:
         # Gains do not depend on it, and a bandwidth that is too high for it is no error yet.

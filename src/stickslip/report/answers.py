@@ -31,7 +31,7 @@ from stickslip.report.sliding_torque import WORSE, Sliding, beaten, sliding_of
 ELSEWHERE = 1.5
 """Times the force error of the fitted records, from which on that of held-out ones is one of another machine."""
 ROUGH = 0.1
-"""Of the torque where the axis slides for certain: what a model misses at most for its form to be taken as right."""
+"""Of the torque in gross sliding: what a model misses at most for its form to be taken as right."""
 UNEVEN = 0.03
 """Of friction's level: a constant torque from which on it may be worth two levels."""
 OWN_WORDS = {
@@ -250,7 +250,7 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
             within_speeds(regression, unit_in(found, "rad/s")) if isinstance(regression, Regression) else ""
         )
         out.append(
-            f"Where the axis slides for certain ({100.0 * sliding.share:.0f} % of the record{speeds}) the model's "
+            f"In gross sliding ({100.0 * sliding.share:.0f} % of the record{speeds}) the model's "
             f"torque is {percent(sliding.relative)} off the measured one, {quantity(sliding.rms, unit)} root mean "
             f"square{plain_there(sliding)}."
         )
@@ -310,7 +310,7 @@ def force_errors(misfit: Mapping[str, float], excused: bool = False) -> list[str
     """
     out: list[str] = []
     for prefix, where in (
-        ("", "Over the whole record, standstills and reversals included (where velocity does not tell the torque)"),
+        ("", "Over the whole record, standstills and reversals included (where velocity does not give the torque)"),
         ("held_out_", "On the records held out, likewise"),
     ):  # fmt: skip
         own = float(misfit.get(f"{prefix}force_relative", math.nan))

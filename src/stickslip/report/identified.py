@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from stickslip.analyse.wording import ends
 from stickslip.finding import Finding
 from stickslip.identify.axis.search import FittedAxis
 from stickslip.identify.estimate import Estimate, Identification, Picture
@@ -184,7 +185,7 @@ def tally(found: Identification, sources: Sequence[Source]) -> list[dict[str, An
         out.append(
             {
                 "count": f"{100.0 * sliding.relative:.3g} %",
-                "words": "torque error where it slides for certain",
+                "words": "torque error in gross sliding",
             }
         )
     for name, words in (
@@ -217,7 +218,7 @@ def interval(e: Estimate) -> str:
     """The 95 % interval in words."""
     if math.isnan(e.lower) or math.isnan(e.upper):
         return "unknown"
-    return "-" if e.undetermined else f"{number(e.lower)} to {number(e.upper)}"
+    return "-" if e.undetermined else " to ".join(ends(e.value, e.lower, e.upper))
 
 
 def shown(e: Estimate, meaning: str = "") -> dict[str, Any]:

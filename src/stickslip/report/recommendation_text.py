@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from stickslip.control.learned import told
+from stickslip.control.registry import control_law
 from stickslip.model import Model
 from stickslip.recommend.notes import HARDLY, WORTH
 from stickslip.recommend.recommend import Candidate, Recommendation
@@ -26,7 +27,12 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
     out.append(
         f"motion:            {path.source}; {path.duration:.3g} s, up to {path.top_speed:.3g} {unit('rad/s')}"
     )
-    gains = ", ".join(f"{k} {v:.5g}" for k, v in result.gains.items() if v)
+    units = {f.name: f.par.unit for kind in ("gains", "cascade") for f in control_law(kind).fields}
+    gains = ", ".join(
+        f"{k} {v:.5g} {unit(units[k]) if units.get(k, '-') != '-' else ''}".rstrip()
+        for k, v in result.gains.items()
+        if v
+    )
     out.append(f"linear controller: {gains}; RMS error alone {result.linear_error:.3g} {unit('rad')}")
     if result.rings:
         out.append(f"linear alone:      without a compensator it oscillates {result.rings}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from stickslip.analyse.wording import ends
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.in_python import in_python
 from stickslip.report.answers import Answers, meaning_of, one_number_each
@@ -58,4 +59,4 @@ def interval_text(e: Estimate) -> str:
     """The 95 % interval."""
     if math.isnan(e.lower) or math.isnan(e.upper):
         return "[unknown]"
-    return f"[{e.lower:.5g}, {e.upper:.5g}]"
+    return "[{}, {}]".format(*ends(e.value, e.lower, e.upper, ".5g"))

@@ -85,7 +85,7 @@ class Sliding:
 
 @lru_cache(maxsize=1)  # the head, its pictures and the command line ask for the same
 def sliding_of(found: Identification) -> Sliding | None:
-    """Torque where the axis slides for certain; None where that was not looked at, or the law says no torque."""
+    """Torque in gross sliding; None where that was not looked at, or the law says no torque."""
     regression, mechanics = found.details.get("regression"), found.details.get("mechanics")
     if not isinstance(regression, Regression) or not isinstance(mechanics, Mechanics):
         return None
@@ -111,7 +111,7 @@ def sliding_of(found: Identification) -> Sliding | None:
 
 
 def left_by_plain(regression: Regression, inverse: Any) -> float:
-    """What the plain inverse dynamics leaves of the torque where the axis slides for certain, N·m (N)."""
+    """What the plain inverse dynamics leaves of the torque in gross sliding, N·m (N)."""
     if not isinstance(inverse, InverseDynamics):
         return math.nan
     return regression.left_by(inverse.numbers())
@@ -168,5 +168,5 @@ def over_all_rows(found: Identification) -> Sliding | None:
 
 
 def beaten(sliding: Sliding) -> bool:
-    """Whether plain least squares explains the torque better even where the axis slides for certain."""
+    """Whether plain least squares explains the torque better even in gross sliding."""
     return sliding.relative > SMALL and sliding.rms > WORSE * sliding.plain

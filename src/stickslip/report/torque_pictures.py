@@ -76,7 +76,7 @@ def over_time(
     unit = units(motion)[0]
     off = f"{100.0 * sliding.relative:.3g} % ({quantity(sliding.rms, unit)} RMS) off"
     message = (
-        f"The model is {off} where the axis slides for certain; its line stops at rest and around reversals."
+        f"The model is {off} in gross sliding; its line stops at rest and around reversals."
         if sliding.certain
         else f"The model is {off}, standstills and reversals included."
     )

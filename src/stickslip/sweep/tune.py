@@ -95,7 +95,7 @@ class Tuned:
         for name, bound in self.at_bounds.items():
             lines.append(
                 f"    {name} stops at the end of its range, {bound:.5g}: the best may lie beyond; widen the range if "
-                "the machine stands it"
+                "the machine allows it"
             )
         return "\n".join(lines)
 

@@ -3,7 +3,7 @@
 Recursive least squares with forgetting on the torque that a disturbance observer sees; the regressors pass through
 the same low-pass, so that its lag does not bias them. Near a reversal, at rest and at the torque limit nothing is
 learnt, and the trace of the covariance is bounded: without either, it wanders and ends in no number within an hour.
-Coulomb torque and offset cannot be told apart before the first reversal.
+Coulomb torque and offset cannot be distinguished before the first reversal.
 """
 
 from __future__ import annotations

@@ -264,7 +264,7 @@ def sentence_on(candidates: Sequence[Candidate], chosen: str) -> str:
     ]
     said = (
         f"Law {chosen!r} is the simplest of those that predict what was held out about as well as any: no other's "
-        f"held-out misfit is below it by a standard error and a quarter (in standard deviations: {', '.join(parts)})."
+        f"held-out misfit is lower by more than 1.25 standard errors (in standard deviations: {', '.join(parts)})."
     )
     if nothing_foreseen(candidates):
         said += (

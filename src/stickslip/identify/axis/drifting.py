@@ -19,7 +19,7 @@ from stickslip.machines.servo import ServoAxis
 CLOSE = 0.999
 LEVELS = ("offset", "fc", "sigma2")
 MAY_DRIFT = (
-    "Friction may drift over the record, which it does not tell from other values of {names}: the interval holds both. "
+    "Friction may drift over the record, not distinguished from other values of {names}: the interval holds both. "
     "Record moves to and fro all along, of a warm axis."
 )
 

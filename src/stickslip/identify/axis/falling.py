@@ -34,8 +34,10 @@ BELOW_SLIDING = (
     "extrapolated: certain sliding begins at {slowest:.3g} {unit}, and below it friction after a reversal looks like a "
     "fall with velocity; record slow constant speeds"
 )
-NO_LEVEL = "the level of friction, which it falls to with velocity, is not told"
-AT_REST = "extrapolated to rest: at which velocity friction falls to its level is not told"
+NO_LEVEL = "the Coulomb level, to which friction falls with velocity, is not determined by the record"
+AT_REST = (
+    "extrapolated to rest: the record does not show at which velocity friction falls to the Coulomb level"
+)
 
 
 def fall_together(

@@ -14,7 +14,7 @@ from stickslip.identify.estimate import Estimate
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TURN = 2.0 * math.pi
-NOT_ITS_SIZE = "the gravity that hangs there is not told"
+NOT_ITS_SIZE = "the size of the gravity torque is not determined"
 
 
 def nearest(angle: float, position: Array) -> float:
@@ -39,7 +39,7 @@ def within_a_turn(estimates: Sequence[Estimate], position: Array) -> tuple[Estim
             lower, upper = e.lower + value - e.value, e.upper + value - e.value
             e = replace(e, value=value, lower=lower, upper=upper)
             if not (upper - value < 0.5 * TURN and value - lower < 0.5 * TURN):
-                why = "any angle serves: gravity is not told"
+                why = "any angle fits: gravity is not determined"
                 lower, upper = value - 0.5 * TURN, value + 0.5 * TURN
                 e = replace(e, lower=lower, upper=upper, identified=False, verdict=why)
         out.append(e)

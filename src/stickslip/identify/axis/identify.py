@@ -201,8 +201,8 @@ def refuse_a_weight(sliding: Regression | None, axis: ServoAxis) -> None:
         if sliding.interval(name)[1] < 0.0:
             raise InputError(
                 f"a constant torque of {constant:.3g} {axis.unit('N·m')} acts, a weight, a spring or an offset, larger "
-                f"than friction, {level:.3g}: it cannot be told from a difference of friction's directions; leave out "
-                "--per-direction"
+                f"than friction, {level:.3g}: it cannot be distinguished from a difference between "
+                "friction's directions; leave out --per-direction"
             )
 
 

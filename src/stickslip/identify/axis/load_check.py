@@ -30,8 +30,8 @@ SURE = 3.0
 OUTER = ("offset", "gravity_", "cos[", "sin[")
 """Names of the torques from outside among the columns of the inverse dynamics."""
 ADVICE = (
-    "Record decelerations so hard that the drive brakes: only there friction that grows with the load tells itself "
-    "apart. Without load_motor (--load) the other values hold at the load of these records."
+    "Record decelerations so hard that the drive brakes: only there load-dependent friction can be "
+    "distinguished. Without load_motor (--load) the other values hold at the load of these records."
 )
 
 
@@ -123,7 +123,7 @@ def judged_load(
         tied = [e.name for e in estimates if e.identified and e.unit.startswith(("N", "kg"))]
         why = dict.fromkeys([*tied, "load_external"], "it goes with load_motor, which is not identified")
         why["load_motor"] = (
-            "without the inverse dynamics nothing tells its effect from that of friction and inertia"
+            "without the inverse dynamics its effect cannot be distinguished from that of friction and inertia"
             if inverse is None
             else f"all but {100.0 * own:.2g} % of its effect looks like more friction and inertia; identified means at "
             f"least {100.0 * LEAST:g} %"

@@ -56,7 +56,7 @@ def inverse_identification(
             ):
                 low, high = min(low, other), max(high, other)
                 notes.append(
-                    f"{name}: {value:.4g} here, {other:.4g} {unit} where the axis slides for certain "
+                    f"{name}: {value:.4g} here, {other:.4g} {unit} in gross sliding "
                     "(reversals, stops and the hold of the torque left out); the interval holds both."
                 )
         if name.startswith(POSITIVE) and name != "gravity_angle":

@@ -55,8 +55,8 @@ def mechanics_parameters(
     ]  # fmt: skip
     for i in range(harmonics):
         described += [
-            (f"cos[{i}]", Par(torque, f"a_{i + 1}", "cosine of the torque over the position"), 0.0),
-            (f"sin[{i}]", Par(torque, f"b_{i + 1}", "sine of the torque over the position"), 0.0),
+            (f"cos[{i}]", Par(torque, f"a_{i + 1}", "cosine of the position-dependent torque"), 0.0),
+            (f"sin[{i}]", Par(torque, f"b_{i + 1}", "sine of the position-dependent torque"), 0.0),
         ]
     for i in range(friction_harmonics):
         described += [

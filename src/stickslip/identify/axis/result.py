@@ -41,12 +41,12 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 WINDOW, CREEP = 0.02, 1e-3
 """s over which a speed is averaged; part of the highest below which an axis counts as at rest."""
 ONLY_REVERSALS = (
-    "only reversals tell it, and the torque is not known to act from row to row as recorded; log the command at "
+    "only reversals determine it, and the torque is not known to act from row to row as recorded; log the command at "
     "the drive's own rate"
 )
 HELD_BY_FRICTION = (
-    "friction's level is not told, and friction at rest holds any torque up to its own: a constant torque shows where "
-    "the axis slides both ways"
+    "the friction level is not determined, and friction at rest holds any torque up to its own: a constant torque "
+    "shows where the axis slides both ways"
 )
 WORSE = 2.0
 """Times the force error of plain least squares from which on a model that leaves more torque than there is tells
@@ -152,7 +152,7 @@ def left_of(sliding: Regression, model: Model, mechanics: Mechanics) -> Array:
 
 
 def left_where_it_slides(sliding: Regression, model: Model, mechanics: Mechanics) -> dict[str, float]:
-    """RMS of the torque that the model leaves where the axis slides for certain; and a fall of friction with velocity
+    """RMS of the torque that the model leaves in gross sliding; and a fall of friction with velocity
     that shows there, but that its law does not have."""
     if model.law.steady is None:
         return {"sliding_rms_Nm": sliding.left}
@@ -276,7 +276,7 @@ def narrow_note(result: OutputError, ask: bool = True) -> str:
     """That the intervals are too narrow where noise is coloured; where friction has a velocity of its own, by far."""
     said = "Intervals come from the covariance of the output error: too narrow where noise is coloured"
     if result.problem.law.velocity_scale:
-        said += ", most of all for what slow motion and break-away tell"
+        said += ", most of all for what slow motion and break-away determine"
     if ask and all(t.drive is not None for t in result.problem.experiments):
         said += ". --intervals prediction gives honest ones"
     return said + "."

@@ -51,16 +51,16 @@ APART, ALONE = 0.05, 1.6
 """Part of friction's level by which it may then be moved, and upper over lower end up to which certain sliding alone
 tells it."""
 TWO_METHODS = (
-    "two methods are {share:.0%} apart: certain sliding says {own:.4g}, the whole record, reversals included, "
+    "two methods are {share:.0%} apart: gross sliding gives {own:.4g}, the whole record, reversals included, "
     "{value:.4g} {unit}"
 )
 TOO_WIDE = (
-    "the interval is too wide: certain sliding alone tells it, to a factor of {factor:.3g}; identified means at most "
-    "{most:.3g} there"
+    "the interval is too wide: gross sliding alone determines it, to within a factor of {factor:.3g}; identified means "
+    "at most {most:.3g} there"
 )
 KEPT = (
-    "Inertia and friction stay those of certain sliding: within its intervals nothing comes near the force error of "
-    "plain least squares, whose numbers leave more of the torque where it slides, torque over the position aside "
+    "Inertia and friction stay those of gross sliding: within its intervals nothing comes near the force error of "
+    "plain least squares, whose numbers leave more of the torque in sliding, position-dependent torque aside "
     "(what play and reversals do is in them)."
 )
 BEST_WITHIN = (

@@ -138,7 +138,7 @@ def remarks_of(fit: Fit, orders: Orders, lag: Lag | None, eccentric: Sequence[Ec
     if low:
         out.append(
             f"Order {' and '.join(f'{n:g}' for n in low)} is gravity, unbalance or load as likely as cogging: turn the "
-            "axis to another attitude to tell."
+            "axis to another attitude to distinguish them."
         )
     return out
 

@@ -20,7 +20,7 @@ def on_one_side(first: Identified, second: Identified) -> tuple[Identified, str]
     ------
     InputError
         If they are about different sides and neither file knows the gear ratio, or they know different ones, or a
-        parameter of the law has a unit that does not tell how it goes through a gear.
+        parameter of the law has a unit that does not show how it transforms through a gear.
     """
     sides = [str(m.axis.get("seen_from", "load")) for m in (first, second)]
     ratios = [float(m.axis.get("gear_ratio", 1.0) or 1.0) for m in (first, second)]
@@ -71,7 +71,7 @@ def _factor(unit: str, n: float, what: str) -> float:
         return n**-2.0
     if re.sub(r"N·m|rad|s|1|[·/()²]", "", unit):
         raise InputError(
-            f"{what}: a unit of {unit} does not tell how it goes through a gear; give both files one side"
+            f"{what}: a unit of {unit} does not show how it transforms through a gear; give both files one side"
         )
     above, _, below = unit.partition("/")
     torque = above.count("N·m") - below.count("N·m")

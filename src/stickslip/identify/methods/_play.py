@@ -43,7 +43,7 @@ def with_dead_travel(
     correlation[:-1, :-1] = found.correlation
     note = (
         f"Backlash: at {best.reversals} reversals the motor travels {best.value:.2g} {unit} before it takes the load "
-        "along. What only reversals tell (friction before sliding) is not the contact's."
+        "along. What only reversals show (pre-sliding friction) is not the contact's."
     )
     return replace(
         found, estimates=(*found.estimates, estimate), correlation=correlation, notes=(*found.notes, note)

@@ -164,7 +164,7 @@ def identify_presliding(
     if shares not in ("free", "equal"):
         raise InputError(f"shares = {shares!r} must be 'free' or 'equal'")
     if elements > GRID:
-        raise InputError(f"elements = {elements} must be at most {GRID}: a loop tells no more apart")
+        raise InputError(f"elements = {elements} must be at most {GRID}: a loop cannot distinguish more")
     straight, notes = loop.righted()
     straight = straight.without_inertia(inertia) if inertia > 0.0 else straight
     found = cycles(loop.position)

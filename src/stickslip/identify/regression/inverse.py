@@ -189,7 +189,7 @@ def _undetermined(names: Sequence[str], w: Array, size: Array) -> str:
         return f"nothing excites {', '.join(still)}"
     without = np.abs(np.linalg.svd(w / size, full_matrices=False)[2][-1])
     tied = [n for n, part in zip(names, without, strict=True) if part > 0.1 * without.max()]
-    return f"the effects of {', '.join(tied[:-1])} and {tied[-1]} cannot be told apart"
+    return f"the effects of {', '.join(tied[:-1])} and {tied[-1]} cannot be distinguished"
 
 
 def refuse_harmonics(experiments: Sequence[Experiment], harmonics: int, *, simulated: bool = False) -> None:
@@ -211,8 +211,8 @@ def refuse_harmonics(experiments: Sequence[Experiment], harmonics: int, *, simul
     samples, count = sum(t.time.size for t in experiments), OTHERS + 2 * harmonics
     if harmonics and samples < 3 * count:
         raise InputError(
-            f"{harmonics} harmonics make {count} parameters, too many for {samples} samples, which tell at most "
-            f"{max(0, (samples // 3 - OTHERS) // 2)} apart; give fewer"
+            f"{harmonics} harmonics make {count} parameters, too many for {samples} samples, which resolve at most "
+            f"{max(0, (samples // 3 - OTHERS) // 2)}; give fewer"
         )
     size = 16.0 * samples * count
     if harmonics and size > MOST_BYTES:

@@ -61,7 +61,7 @@ another program's 200 logs, 5 to 15 % unsure, all held, wrong by 4 % at most."""
 FALLS, SHOWN = 0.95, 4.0
 """Probability, and standard deviations of Fs - Fc, from which on friction is taken to fall with velocity."""
 LEVEL_UNTOLD = (
-    "extrapolated: friction may still fall at the highest recorded speeds, and viscous friction is not told apart "
+    "extrapolated: friction may still fall at the highest recorded speeds, and viscous friction is not distinguished "
     "from it"
 )
 ONE_SPEED = 0.65
