@@ -98,8 +98,8 @@ STUDY = [
     ("output = 1e-3", "plugins = [3]", "plugins"),
     ("output = 1e-3", 'plugins = ["broken.py"]', "broken.py"),
     ('frictions = ["none", "nominal"]', 'frictions = ["none", "nominel"]', "comparisons.pr-pd.frictions"),
-    ("pr-pd.friction.none]", "pr-pd.friction.nominal]", "comparisons.pr-pd.frictions = ['none'"),
-    ("pr-pd.controller.PR]", "pr-pd.controller.PD]", "comparisons.pr-pd.controllers = ['PR'"),
+    ("pr-pd.friction.none]", "pr-pd.friction.nominal]", "comparisons.pr-pd.frictions: 'none'"),
+    ("pr-pd.controller.PR]", "pr-pd.controller.PD]", "comparisons.pr-pd.controllers: 'PR'"),
     (
         'pr-pd.controller.PR]\nlinear = "PR"',
         'pr-pd.controller.PD]\nlinear = "PR"\n[comparisons.pr-pd.controller.PR]\nlinear = "PR"',

@@ -82,7 +82,7 @@ def test_a_fall_below_all_certain_sliding_is_not_identified(velocity: float, tol
     level = Estimate("fc", "N·m", "F_C", velocity, 0.01, velocity - 0.02, velocity + 0.02, True)
     judged = within_sliding(falls, 0.25)
     assert judged.identified is told
-    assert told or judged.verdict.startswith("extrapolated: certain sliding begins at 0.25 rad/s")
+    assert told or judged.verdict.startswith("extrapolated: gross sliding begins at 0.25 rad/s")
     assert within_sliding(level, 0.25) == level
 
 

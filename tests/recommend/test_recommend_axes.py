@@ -95,7 +95,7 @@ def test_a_refusal_says_that_what_no_record_told_decides() -> None:
     said = list(notes_on(unsure, None, [other]))
     assert said[-2] == f"No compensator is recommended: {worse}."
     assert said[-1].startswith("On the best estimate 30 % of the error would be left")
-    assert "it does not tell inertia" in said[-1]
+    assert "it does not determine inertia" in said[-1]
     # On the best estimate already: nothing that another record tells would change it.
     assert not [n for n in notes_on(unsure, None, [Candidate(fed, (1.2,), (worse,))]) if "best estimate" in n]
 

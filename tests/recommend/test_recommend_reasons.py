@@ -50,7 +50,7 @@ def test_the_sample_time_is_the_records_where_nothing_else_is_given_and_it_is_sa
     assert "--sample-time" in said
     period, source = sample_time_for(identified(), None, None, drive_of)
     assert period == pytest.approx(1e-3)
-    assert source.startswith("assumed, as the model does not tell")
+    assert source.startswith("assumed, as the model does not contain")
 
 
 @pytest.mark.parametrize(("period", "kept"), [(2e-3, True), (3e-3, True), (5e-3, False), (0.03, False)])

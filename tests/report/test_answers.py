@@ -207,7 +207,7 @@ def test_a_model_that_misses_the_torque_is_not_called_right() -> None:
     sliding = sliding_of(found)
     assert sliding is not None
     assert sliding.plain == pytest.approx(sliding.rms, rel=0.2)
-    assert "%" in next(t["count"] for t in tally(wrong, []) if "slides" in t["words"])
+    assert "%" in next(t["count"] for t in tally(wrong, []) if "gross sliding" in t["words"])
 
 
 def test_other_methods_have_words_and_a_next_command() -> None:
@@ -257,7 +257,7 @@ def test_the_command_line_prints_the_same_in_short() -> None:
     out = "\n".join(result_lines(found, answers_of(found, [log()], "model.toml"))).splitlines()
     assert next(line for line in out if line.startswith("fc ")).endswith("identified      Coulomb torque")
     trust = next(i for i, line in enumerate(out) if line.startswith("trust: "))
-    assert "slides for certain" in out[trust + 1]
+    assert "In gross sliding" in out[trust + 1]
     assert not [line for line in out if line.startswith("position_")]
     assert out[-2].startswith("next: stickslip recommend model.toml")
 

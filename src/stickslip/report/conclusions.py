@@ -51,7 +51,7 @@ def study_conclusion(view: StudyView, tally: Sequence[Mapping[str, Any]] = ()) -
     if len(pairs) > 1:
         listed = ", ".join(f"{name} {number(middle_of(factors_of(own)))}" for name, own in pairs.items())
         said.append(
-            f"By friction, the best linear controller's error over the best compensator's, middle case: {listed}."
+            f"By friction, the best linear controller's error over the best compensator's, median case: {listed}."
         )
     if winners:
         most = max(dict.fromkeys(winners), key=winners.count)
@@ -78,11 +78,11 @@ def helped(pairs: Sequence[tuple[float, float]], cases: str) -> str:
     said = (
         f"The best friction compensator has a smaller error than the best linear controller in {better} of "
     )
-    said += f"{len(factors)} {cases}: {number(middle_of(factors))} times smaller"
+    times = number(middle_of(factors))
+    said += f"{len(factors)} {cases}; the linear controller's error is {times} times the compensator's"
     if len(factors) == 1:
         return f"{said}."
-    larger = "; below 1 it is larger" if factors[0] < 1.0 else ""
-    return f"{said} in the middle one ({number(factors[0])} to {number(factors[-1])} over all{larger})."
+    return f"{said} in the median case ({number(factors[0])} to {number(factors[-1])})."
 
 
 def factors_of(pairs: Sequence[tuple[float, float]]) -> list[float]:

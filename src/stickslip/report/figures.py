@@ -182,7 +182,8 @@ def result_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
 def titled(view: StudyView, case: Case) -> str:
     """A case in words, and which part of it a figure shows."""
     reference = view.edition.references.get(case.reference, f"reference {case.reference}")
-    friction = view.edition.frictions.get(case.friction, f"friction {case.friction}")
+    plant = "friction" if case.friction in view.result.config.get("friction", {}) else "machine"
+    friction = view.edition.frictions.get(case.friction, f"{plant} {case.friction}")
     words = f"{reference}, {friction}" + (f", {case.kind}" if case.kind else "")
     words += f" (part {case.part + 1} of {case.parts})" if case.parts > 1 else ""
     return words[0].upper() + words[1:]

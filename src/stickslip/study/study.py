@@ -140,9 +140,8 @@ def _finished(
             yield found
         else:
             missing.append(p)
-    if say and len(missing) < len(planned):
-        more = "; going on" if missing else ""
-        say(f"{len(planned) - len(missing)} of {len(planned)} runs were already done{more}")
+    if say and 0 < len(missing) < len(planned):
+        say(f"{len(planned) - len(missing)} of {len(planned)} runs were already done; going on")
     for p in missing:
         p.check()  # Before the first of them runs; laws are compiled here, one after another.
     if jobs == 1:

@@ -44,7 +44,7 @@ SHOWN = (
     "Friction falls as exp(-|v/vs|^delta_s) with delta_s = {found:g}, not the usual {usual:g}: {by} (--set "
     "delta_s={usual:g} fits that all the same)."
 )
-SLIDING, RECORD = "certain sliding shows it", "the record is explained better"
+SLIDING, RECORD = "gross sliding shows it", "the record is explained better"
 UNDECIDED = (
     "Whether friction falls with delta_s = 1 or 2 the record does not decide; the intervals of Fs and vs hold what "
     "both say."

@@ -31,7 +31,7 @@ NOT_TOGETHER = (
 )
 BELOW = f"the torque asks for {{value:.3g}} {{unit}} ({{high:.3g}} at most), which cannot be below 0: {NOT_TOGETHER}"
 BELOW_SLIDING = (
-    "extrapolated: certain sliding begins at {slowest:.3g} {unit}, and below it friction after a reversal looks like a "
+    "extrapolated: gross sliding begins at {slowest:.3g} {unit}, and below it friction after a reversal looks like a "
     "fall with velocity; record slow constant speeds"
 )
 NO_LEVEL = "the Coulomb level, to which friction falls with velocity, is not determined by the record"
@@ -58,7 +58,7 @@ def fall_together(
     apart = abs(own.value - e.value) > math.hypot(half_width(e), QUANTILE * own.std)
     if found.falls >= FALLS and apart and abs(own.value - e.value) > SAME * abs(e.value):
         notes.append(
-            f"{e.name}: certain sliding says {own.value:.4g}, the prediction error {e.value:.4g} {e.unit}; the "
+            f"{e.name}: gross sliding says {own.value:.4g}, the prediction error {e.value:.4g} {e.unit}; the "
             "interval holds both."
         )
         value = own.value if found.shows_a_fall else e.value

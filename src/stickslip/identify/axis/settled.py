@@ -40,7 +40,7 @@ WORTH_A_WORD = 0.99
 QUANTILE = 1.96
 TIES, HALVINGS = (1e-6, 1e3), 40
 """Weights between which that is looked for which moves identified values least; halvings of that search."""
-MOVED = "the whole record, reversals included, asks for another value than certain sliding does"
+MOVED = "the whole record, reversals included, asks for another value than gross sliding does"
 FOLLOWED = 1.045
 """Times the force error of plain least squares, a little within `ALIKE`, to which values move that follow them although
 certain sliding refutes them: no farther."""

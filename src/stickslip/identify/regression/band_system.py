@@ -332,9 +332,7 @@ class System:
             logs.append(log if fc > 0.0 and RISE * fc <= fall <= DEEPEST * fc else -math.inf)
         best = max(logs)
         if not math.isfinite(best):
-            raise InputError(
-                "certain sliding gives no numbers to compute with; check the units of the record"
-            )
+            raise InputError("gross sliding gives no numbers to compute with; check the units of the record")
         weight = np.exp(np.array(logs) - best)
         return weight / weight.sum()
 

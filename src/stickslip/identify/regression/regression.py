@@ -68,7 +68,7 @@ ONE_SPEED = 0.65
 """Of the highest speed, from which on the slowest rows lie at the same: level and slope are then one number. Levels of
 parts of a motor's record from 0.6 of it on agree; one of another program's log, from 0.69 on, was 35 % too low."""
 AT_ONE_SPEED = (
-    "extrapolated: the slowest certain sliding is at {share:.0%} of the highest speed, where level and slope of "
+    "extrapolated: the slowest gross sliding is at {share:.0%} of the highest speed, where level and slope of "
     "friction are one number; record slower moves, too"
 )
 STILL_ROUGH = "motor and load do not move as one even in the windows in which they do so best, and "

@@ -118,7 +118,7 @@ def narrowest_width(signals: Signals) -> float:
     while True:
         if width > WIDEST * seconds:
             raise InputError(
-                f"the position is so coarse that certain sliding shows over {width:.2g} s alone, and the record lasts "
+                f"the position is so coarse that gross sliding shows over {width:.2g} s alone, and the record lasts "
                 f"{seconds:.3g} s; record faster motion, or a finer position"
             )
         window = Window(width, signals.period)
@@ -255,7 +255,7 @@ def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
     places = np.flatnonzero(clear[::stride]) * stride
     if places.size < FEWEST:
         raise InputError(
-            f"{places.size * stride * period:.3g} s of certain sliding are too little; record longer motion in one "
+            f"{places.size * stride * period:.3g} s of gross sliding are too little; record longer motion in one "
             "direction, or a finer position"
         )
     stopped = np.maximum.accumulate(np.where(doubtful, np.arange(q.size), 0))
