@@ -29,7 +29,7 @@ def make() -> None:
     """Write the page and its pictures."""
     kinds = [plugins.reference_kind(name) for name in plugins.reference_names()]
     parts = [
-        "# Reference motions\n\nWhat an axis is told to do: `kind` in a file, `ss.Reference(kind, ...)` in Python. "
+        "# Reference motions\n\nWhat an axis is to follow: `kind` in a file, `ss.Reference(kind, ...)` in Python. "
         "Position in rad, velocity in rad/s, time in s."
     ]
     for kind in kinds:

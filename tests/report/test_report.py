@@ -15,6 +15,7 @@ from stickslip import report
 from stickslip.approval import allow_code
 from stickslip.report._tables import MetricsTable, metrics_tables
 from stickslip.report._view import StudyView
+from stickslip.report.bench_report import shown
 from stickslip.report.captions import case_caption, case_message
 from stickslip.report.conclusions import helped, rig_conclusion
 from stickslip.report.figures import off_scale, result_cases
@@ -319,3 +320,7 @@ def test_a_conclusion_says_by_how_much() -> None:
     assert "hold wherever they were tried: a." in lines[1]
     assert "do not hold everywhere: b (1 of 3 parts)." in lines[2]
     assert "2 times the compensator's" in lines[3]
+
+
+def test_a_small_ratio_of_the_bench_is_not_rounded_to_nothing() -> None:
+    assert [shown(x) for x in (1.234, 0.2214, 0.0131, 0.00042)] == ["1.23", "0.221", "0.013", "0.00042"]

@@ -1,4 +1,4 @@
-"""What an axis is told to do: one file a kind. `REFERENCES` names them.
+"""Reference motions of an axis: one file a kind. `REFERENCES` names them.
 
 To add a kind, write its file and add its name to this tuple.
 """

@@ -113,7 +113,9 @@ def shown(value: float | None) -> str:
     """A ratio for people."""
     if value is None or not math.isfinite(value):
         return "–"
-    return f"{value:.3f}" if value < 1.0 else f"{value:.2f}"
+    if value >= 1.0:
+        return f"{value:.2f}"
+    return f"{value:.3f}" if value >= 0.01 else f"{value:.2g}"
 
 
 def dots(title: str, message: str, own: Sequence[Standing]) -> str:
