@@ -29,7 +29,7 @@ from stickslip.identify.regression.band_system import (
 from stickslip.identify.regression.bent import bent_in, explains
 from stickslip.identify.regression.drifting import drift_rows
 from stickslip.identify.regression.flexible import Train
-from stickslip.identify.regression.number import Number
+from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import memory_of
 
@@ -274,9 +274,9 @@ def summed_up(
     misfit = float(np.sqrt(np.mean(residual**2)))
     bend, bent = bent_in(system, candidates, weight)
     if bent is not None and explains(system, bent, best):
-        # What friction rises by, of another form, would pass for inertia where the axis accelerates at speed.
-        variance = system.covariance(torque, bent)[INERTIA, INERTIA]
-        numbers["inertia"] = Number(float(bent.values[INERTIA] / system.scale[INERTIA]), math.sqrt(variance))
+        # What friction rises by passes for inertia where the axis accelerates at speed: that of either form may be it.
+        own, other = numbers["inertia"], float(bent.values[INERTIA] / system.scale[INERTIA])
+        numbers["inertia"] = Number(other, math.hypot(own.std, (other - own.value) / QUANTILE))
     rows = np.array(list(named.values()))
     joint = rows @ system.covariance(torque, best)[:core, :core] @ rows.T
     # Of a motion that tells two columns hardly apart, rounding leaves a variance below 0: related to nothing then.
