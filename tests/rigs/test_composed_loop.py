@@ -88,7 +88,7 @@ def test_one_controller_hands_over_to_the_other_kind_and_back():
 
 def test_another_sample_time_is_refused():
     with (
-        pytest.raises(InputError, match=r"sample_time = 0\.002 s, the rig's is 0\.001 s"),
+        pytest.raises(InputError, match=r"sample_time = 0\.002 s, that of the rig is 0\.001 s"),
         Loop(AxisRig()) as loop,
     ):
         loop.run(sine(10), Controller(loop=PD, sample_time=2e-3))

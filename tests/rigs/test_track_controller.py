@@ -87,6 +87,12 @@ def test_an_observer_tracks_closer_and_the_plan_names_the_file(file):
     assert plan.text == (f"follow low for 5 s: by the controller of {path}",)
 
 
+def test_a_file_without_a_sample_time_takes_that_of_the_rig(file):
+    text = (FILE + OBSERVER).replace("sample_time = 1e-3\n", "")
+    made = procedure("track").with_options({"controller": file(text)}).made(virtual_rig("thesis-dry"))
+    assert made.sample_time == 1e-3
+
+
 def test_the_limit_of_the_rig_is_kept_and_a_lower_one_too(file):
     rig = virtual_rig("thesis-dry")
     free = procedure("track").with_options({"controller": file(FILE)}).made(rig)
@@ -141,7 +147,7 @@ loop = {law = "sliding_mode", slope = 62.8, torque = 0.3, layer = 0.5}
             {"gain": "0.9"},
             "gain = 0.9 cannot be combined with controller = controller.toml, which defines it",
         ),
-        (FILE.replace("1e-3", "2e-3"), {}, "sample_time = 0.002 s, the rig's is 0.001 s"),
+        (FILE.replace("1e-3", "2e-3"), {}, "sample_time = 0.002 s, that of the rig is 0.001 s"),
         (FILE.replace('loop = {law = "pd"}', 'linear = "PD"'), {}, "names no control laws; give it a loop"),
         (FILE + AHEAD.replace("lugre", "lugri"), {}, "friction = 'lugri' is not known; did you mean 'lugre'"),
         (FILE.replace(PLACED, ""), {}, "kp"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,12 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import ConfigError
-from stickslip.machines.files import machine
+from stickslip.machines.files import LIBRARY, machine
 from stickslip.machines.machine import IMPERFECTIONS
 from stickslip.simulation.machine.loop import FINER, simulate_machine
 from stickslip.study import study as studies
 from stickslip.study.plan import load, load_run
+from stickslip.sweep import plan as sweep_plan
 from stickslip.sweep.measured import measured
 from stickslip.sweep.metric_check import checked
 from stickslip.sweep.numbers import known, varied
@@ -185,3 +187,79 @@ def test_the_study_of_imperfections_ships() -> None:
     planned = load("imperfections")
     assert len({r.controller for r in planned.runs}) == 10
     assert len({r.friction for r in planned.runs}) == 14
+
+
+POLES = "placement = {bandwidth_hz = 10.0, damping = 0.85}"
+OBSERVED = """
+[controllers.observed]
+loop = {law = "pd"}
+observer = {law = "disturbance_observer", corner = 100.0}
+"""
+
+
+def test_controllers_without_a_sample_time_take_that_of_each_machine(
+    study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    slower = (LIBRARY / "ideal.toml").read_text().replace("sample_time = 1e-3", "sample_time = 2e-3")
+    (study.parent / "slower.toml").write_text(slower)
+    study.write_text(
+        STUDY.partition("[machines.bare]")[0]
+        + '[machines.slower]\nmachine = "slower.toml"\n\n[references.low]'
+        + STUDY.partition("[references.low]")[2].replace("duration = 1.0", "duration = 0.2")
+        + OBSERVED
+    )
+    planned = load(study)
+    times = {(r.friction, r.controller): r.control.sample_time for r in planned.runs}
+    assert times == {
+        (m, c): t for m, t in (("all", 1e-3), ("slower", 2e-3)) for c in ("PD", "FF", "observed")
+    }
+    assert main(["study", str(study), "--out", str(study.parent / "out"), "--no-report"]) == 0
+    assert "controllers sampled every 0.001, 0.002 s" in capsys.readouterr().out
+    entries = json.loads((study.parent / "out" / "manifest.json").read_text())["runs"]
+    assert {e["sample_time_s"] for e in entries} == {1e-3, 2e-3}
+
+
+def test_an_ideal_axis_beside_a_machine_has_no_sample_time_to_give(study: Path) -> None:
+    axis = '[axis]\ninertia = 4e-4\n\n[friction.rigid]\nlaw = "coulomb"\nfc = 0.3\n\n'
+    study.write_text(axis + STUDY + OBSERVED)
+    with pytest.raises(ConfigError, match=r"controllers\.observed: .* give a sample_time"):
+        load(study)
+    study.write_text(axis + STUDY + OBSERVED + "sample_time = 1e-3\n")
+    assert {r.friction for r in load(study).runs} >= {"rigid", "all"}
+
+
+def test_a_single_run_and_a_sweep_take_the_machines_sample_time(run: Path, study: Path) -> None:
+    run.write_text(RUN.partition("[controller]")[0] + OBSERVED.replace("controllers.observed", "controller"))
+    run.write_text(run.read_text().replace("duration = 0.5", f"duration = 0.2\n{POLES}"))
+    planned = load_run(run)
+    assert planned.control.sample_time == 1e-3
+    found = measured(
+        planned, {"controller.observer_corner": np.array([80.0, 100.0])}, ["position_rms_rad"], 2
+    )
+    alone = ss.simulate(planned.axis, planned.control, planned.motion, planned.duration)
+    assert found.failures == ["", ""]
+    assert found.metrics[1, 0] == alone.meta["metrics"]["position_rms_rad"]
+    study.write_text(STUDY + OBSERVED)
+    tuning = study.parent / "tuning.toml"
+    tuning.write_text(
+        'study = "study.toml"\nonly = ["bare", "observed"]\ncases = 2\nmetrics = ["position_rms_rad"]\n\n'
+        '[vary."machine.start_angle"]\nrange = [0.0, 1.0]\n\n'
+        '[tune."controller.observer_corner"]\nrange = [50.0, 90.0]\n'
+    )
+    assert sweep_plan.load(tuning).runs[0].control.sample_time == 1e-3
+
+
+@pytest.mark.parametrize("given", ["0.0005", "0.002"])
+def test_experiments_take_no_other_sample_time_than_the_machines(study: Path, given: str) -> None:
+    experiment = (
+        '[experiments.one]\nmachine = "all"\nreference = "low"\n'
+        'linear = "PD"\nbandwidth_hz = 10.0\ndamping = 0.85\n'
+    )
+    text = STUDY.replace(f"{POLES}\n", "") + OBSERVED
+    study.write_text(text + experiment)
+    assert {r.control.sample_time for r in load(study).runs} == {1e-3}
+    study.write_text(text + f"sample_time = {given}\n" + experiment)
+    with pytest.raises(
+        ConfigError, match=rf"controllers\.observed: .*sample_time = {given} s, that of the machine"
+    ):
+        load(study)

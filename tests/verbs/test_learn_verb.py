@@ -139,3 +139,9 @@ def test_the_command_writes_a_controller_that_runs(tmp_path: Path, monkeypatch, 
     axis = ss.RigidAxis(INERTIA, ss.Model("coulomb", fc=0.285, sigma2=0.018))
     assert error_with(controller, BRISK, 0.5, axis) == pytest.approx(min(said["errors"]), rel=1e-6)
     assert main(["learn", "my.toml", "--corner", "400"]) == 2
+
+
+def test_a_machine_learns_at_its_own_sample_time_alone() -> None:
+    gains = ss.place("PD", INERTIA, 20.0)
+    with pytest.raises(InputError, match=r"sample_time = 0\.002 s, that of the machine ripple is 0\.001 s"):
+        ss.learn(RIPPLE, ss.Controller(gains, sample_time=2e-3), BRISK, 0.5)

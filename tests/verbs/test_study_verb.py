@@ -97,3 +97,25 @@ def test_a_contact_without_springs_is_said_to_be_one() -> None:
             ss.stability(axis, controller, **given)
     with pytest.raises(ss.InputError, match="continuous time"):
         ss.stability(axis, ss.Controller(ss.place("PD", 4e-4, 10.0, 1.0)))
+
+
+OBSERVER = """
+[controller.observer]
+law = "disturbance_observer"
+inertia = 4.2757e-4
+corner = 100.0
+"""
+
+
+def test_stability_samples_a_controller_as_its_machine_does(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "observed.toml"
+    file.write_text(CONTROLLER + OBSERVER)
+    told = ss.stability("thesis-dry", file)
+    file.write_text((CONTROLLER + OBSERVER).replace("sample_time = 0.001", ""))
+    assert list(ss.stability("thesis-dry", file).lines()) == list(told.lines())
+    assert main(["analyse", "stability", "--rig", "thesis-dry", "--controller", str(file)]) == 0
+    assert "sample time 1 ms" in capsys.readouterr().out
+    placed = ss.Controller(ss.place("PD", 4.2757e-4, 10.0, 1.0))
+    assert ss.stability("thesis-dry", placed).sample_time == 1e-3

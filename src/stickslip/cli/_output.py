@@ -203,6 +203,9 @@ def print_study(result: StudyResult, report: Path | None, kept: int) -> None:
         f"position error in mrad, RMS and peak; * is the best of its column. {count}, "
         f"{result.manifest['timings']['wall_s']:.1f} s"
     )
+    times = {entry["sample_time_s"] for entry in result.manifest["runs"]} - {0.0}
+    if times:
+        print(f"controllers sampled every {', '.join(f'{time:g}' for time in sorted(times))} s")
     print_starts(result.runs)
     for path in (result.folder / "metrics.csv", result.folder / "manifest.json", report):
         if path:

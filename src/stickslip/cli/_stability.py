@@ -106,7 +106,10 @@ def composed(
             )
     plant = machine_of(args)
     controller = read_controller(
-        args.controller, plant.inertia if args.inertia is None else args.inertia, plant.models
+        args.controller,
+        plant.inertia if args.inertia is None else args.inertia,
+        plant.models,
+        plant.sample_time,
     )
     delay = plant.delay if args.delay is None else args.delay
     if args.confirm and args.delay is not None:

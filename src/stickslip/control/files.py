@@ -50,7 +50,10 @@ def is_composed(table: Table) -> bool:
 
 
 def read_controller(
-    path: str | os.PathLike[str], inertia: float | None = None, known: Mapping[str, Model] | None = None
+    path: str | os.PathLike[str],
+    inertia: float | None = None,
+    known: Mapping[str, Model] | None = None,
+    sample_time: float = 0.0,
 ) -> Controller:
     """Read the controller of a file.
 
@@ -62,6 +65,8 @@ def read_controller(
         Of the axis, kg·m², where the file has no ``[axis]``; without it the file must have one.
     known : mapping of str to Model, optional
         What ``friction`` may name besides the file's own ``[laws.NAME]``.
+    sample_time : float
+        Of the machine or rig that it is for, s, where the file gives none; 0: none.
 
     Raises
     ------
@@ -82,7 +87,8 @@ def read_controller(
                 f'{table.label()} names no control laws; give it a loop, `loop = {{law = "pd"}}`'
             )
         laws = {name: law for name, law in files.items() if isinstance(law, ControlLaw)}
-        return composed(table, inertia, placement(table) or default, {**(known or {}), **own}, laws)
+        poles = placement(table) or default
+        return composed(table, inertia, poles, {**(known or {}), **own}, laws, sample_time)
 
 
 def composed(
@@ -91,6 +97,7 @@ def composed(
     poles: Placement | None,
     known: Mapping[str, Model],
     laws: Mapping[str, ControlLaw],
+    sample_time: float = 0.0,
 ) -> Controller:
     """Read a controller.
 
@@ -105,6 +112,8 @@ def composed(
         What ``friction`` may name.
     laws : mapping of str to ControlLaw
         Control laws from files, by name; the registered ones are known anyway.
+    sample_time : float
+        Of the machine or rig that it is for, s, where the table gives none; 0: none, continuous time.
 
     Raises
     ------
@@ -123,7 +132,7 @@ def composed(
             gains_in(table, inertia, poles) if short or any(map(table.has, OF_GAINS)) else None,
             compensator_in(table, known),
             table.positive("torque_limit", "N·m") if table.has("torque_limit") else math.inf,
-            table.number("sample_time", "s", 0.0, lower=0.0),
+            table.number("sample_time", "s", sample_time, lower=0.0),
             table.number("encoder_counts", "counts per revolution", 0.0, lower=0.0),
             table.number("velocity_filter", "Hz", 0.0, lower=0.0),
             estimator=estimator[0] if estimator else None,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from stickslip.control.composition import MEMORY
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
 from stickslip.control.linear import Gains
-from stickslip.errors import InputError
+from stickslip.control.sample_time import sampled_by
 from stickslip.jit import call_guarded, compiled_guarded, flat, kernel, pointer, pointer_at, record_at
 from stickslip.rigs.rig import Limits, Measurement, Setpoint
 from stickslip.rigs.safety import STOPPED, Safety, bounds, guarded_by
@@ -85,11 +84,7 @@ def control_of(
     InputError
         If the controller is meant for another sample time.
     """
-    if controller is not None and controller.sample_time not in (0.0, sample_time):
-        raise InputError(
-            f"controller: sample_time = {controller.sample_time:g} s, the rig's is {sample_time:g} s; give the rig's"
-        )
-    chosen = replace(controller or NOTHING, sample_time=sample_time)
+    chosen = sampled_by(controller or NOTHING, sample_time, "rig")
     # The setpoints' torques alone are given as they are.
     numbers = chosen.settings if controller else chosen.settings._replace(fade=0.0)
     memory = np.zeros(len(NAMES))

@@ -76,6 +76,11 @@ def axis(table: Table, friction: Model) -> RigidAxis:
         )
 
 
+def sample_time_of(axis: RigidAxis | Machine) -> float:
+    """The sample time that the axis gives its controllers, s; 0 where it leaves it to them."""
+    return axis.sample_time if isinstance(axis, Machine) else 0.0
+
+
 def machine_of(table: Table) -> dict[str, Machine]:
     """The machines of a table by what to append to its name: ``machine`` (a name of the library or a file) with all its
     imperfections; less those of ``without``, with those of ``only`` alone, or one for each of ``each_alone``, alone."""
@@ -170,6 +175,7 @@ def controller(
     default: Placement | None,
     laws: Mapping[str, Model],
     files: Mapping[str, Law | ControlLaw],
+    sample_time: float = 0.0,
 ) -> Controller:
     """Read a controller, of control laws or in its short form (`stickslip.control.files`).
 
@@ -184,6 +190,8 @@ def controller(
         What ``law`` may name.
     files : mapping of str to Law or ControlLaw
         Laws from files, by name.
+    sample_time : float
+        Of the axis that it is for, s, where the table gives none (`sample_time_of`).
     """
     own = {name: law for name, law in files.items() if isinstance(law, ControlLaw)}
-    return composed(table, inertia, placement(table) or default, laws, own)
+    return composed(table, inertia, placement(table) or default, laws, own, sample_time)

@@ -20,6 +20,7 @@ from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.control.files import is_composed
 from stickslip.control.linear import LINEAR
+from stickslip.control.sample_time import sampled_by
 from stickslip.errors import Interrupted, RigError
 from stickslip.machines.files import LIBRARY, library
 from stickslip.machines.machine import IMPERFECTIONS, Machine
@@ -231,8 +232,10 @@ def _controllers(
 
     def made(table: Table) -> Controller:
         with table:
-            found = build.controller(table, placed_with, e.poles, known, files)
-        return replace(found, torque_limit=min(found.torque_limit, limit), sample_time=plant.sample_time)
+            found = build.controller(table, placed_with, e.poles, known, files, plant.sample_time)
+            with table.blamed():
+                found = sampled_by(found, plant.sample_time, f"machine {plant.name}")
+        return replace(found, torque_limit=min(found.torque_limit, limit))
 
     any_table = next(iter(tables.values()))
     for kind in (e.linear, *(k for k in e.beside if k != e.linear)):

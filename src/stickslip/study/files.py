@@ -251,6 +251,7 @@ def _entry(folder: Path, planned: PlannedRun, run: Run) -> dict[str, Any]:
         "run": run.key,
         "fingerprint": planned.fingerprint,
         "record": run.path.relative_to(folder).as_posix(),
+        "sample_time_s": planned.control.sample_time,
         "cpu_s": run.seconds,
         "failure": run.failure,
         "metrics": {k: None if math.isnan(v) else v for k, v in run.metrics.items()},

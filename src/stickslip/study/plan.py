@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -179,7 +180,9 @@ def load_run(path: Path) -> PlannedRun:
             motion = _Motion.read(t)
         with table.table("controller") as t:
             numerics = build.numerics(t, numerics)
-            control = build.controller(t, axis.inertia, motion.placement, laws, files)
+            control = build.controller(
+                t, axis.inertia, motion.placement, laws, files, build.sample_time_of(axis)
+            )
     return PlannedRun(
         named_rule(rule, axis, control), motion.reference.kind.name, axis.friction.law.name, "controller",
         axis, control, motion.reference, motion.duration, numerics,
@@ -270,23 +273,29 @@ class _Parts:
         controllers: Iterable[str],
     ) -> list[PlannedRun]:
         """Every one of each with every one of the others."""
-        made: dict[tuple[str, str], tuple[Controller, Numerics]] = {}
-        inertia = self.inertia
-        for c in controllers:
-            for m in motions:
-                with self.controllers[c] as table:
-                    numerics = build.numerics(table, self.numerics)
-                    made[c, m] = (
-                        build.controller(
-                            table, inertia, self.motions[m].placement, self.laws, self.laws_from_files
-                        ),
-                        numerics,
-                    )
-        return [
-            PlannedRun(named_rule(rule, self.frictions[f], made[c, m][0]), m, f, c, self.frictions[f], made[c, m][0],
-                       self.motions[m].reference, self.motions[m].duration, made[c, m][1])
-            for rule in rules for m in motions for f in frictions for c in controllers
-        ]  # fmt: skip
+        axes = {f: self.frictions[f] for f in frictions}
+        times = {f: build.sample_time_of(axis) for f, axis in axes.items()}
+        made = {
+            (c, m, time): self._made(c, m, time)
+            for c in controllers for m in motions for time in dict.fromkeys(times.values())
+        }  # fmt: skip
+        out: list[PlannedRun] = []
+        for rule, m, f, c in itertools.product(rules, motions, axes, controllers):
+            control, numerics = made[c, m, times[f]]
+            motion = self.motions[m]
+            name = named_rule(rule, axes[f], control)
+            out.append(
+                PlannedRun(name, m, f, c, axes[f], control, motion.reference, motion.duration, numerics)
+            )
+        return out
+
+    def _made(self, name: str, motion: str, sample_time: float) -> tuple[Controller, Numerics]:
+        """A controller along a motion on axes with that sample time (s, 0: none), and how its runs are integrated."""
+        with self.controllers[name] as table:
+            numerics = build.numerics(table, self.numerics)
+            poles = self.motions[motion].placement
+            made = build.controller(table, self.inertia, poles, self.laws, self.laws_from_files, sample_time)
+        return made, numerics
 
 
 def _models_of(machines: Mapping[str, Machine]) -> dict[str, Model]:

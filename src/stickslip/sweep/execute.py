@@ -347,8 +347,13 @@ def write_manifest(
         "metrics": list(sweep.metrics),
         "timings": dict(timings),
         "runs": [
-            {"run": p.key, "fingerprint": sweep.fingerprint(i), "integrator": name}
-            | ({"because": why} if why else {})
+            {
+                "run": p.key,
+                "fingerprint": sweep.fingerprint(i),
+                "integrator": name,
+                "sample_time_s": p.control.sample_time,
+                **({"because": why} if why else {}),
+            }
             for i, (p, (name, why)) in enumerate(zip(sweep.runs, integrators))
         ],
     }

@@ -18,6 +18,7 @@ from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.learning import TimeTable, low_pass
+from stickslip.control.sample_time import sampled_by
 from stickslip.control.written import tables_of
 from stickslip.errors import InputError, unwritable
 from stickslip.machines.drivetrain import Drivetrain
@@ -183,7 +184,7 @@ class _Repeated:
     ) -> None:  # fmt: skip
         own = controller.with_blocks(controller.blocks.values())
         if isinstance(axis, Machine):
-            own = replace(own, sample_time=axis.sample_time)
+            own = sampled_by(own, axis.sample_time, f"machine {axis.name}")
         if own.sample_time == 0.0:
             raise InputError("learn: the controller acts in continuous time; give it a sample_time above 0")
         whole = [b.law.name for b in own.blocks.values() if b.law.option_of("fed_with") == "whole"]

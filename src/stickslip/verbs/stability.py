@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 
 from stickslip.analyse.controller_margins import ControllerStability, controller_stability
 from stickslip.analyse.machine_axis import axis_of
@@ -39,7 +40,8 @@ def stability(
         A rigid axis has no delay, and the controller's encoder; a path is that of a machine's file, or its name in the
         library.
     controller : Controller or path
-        Sampled. A path is that of a file with a table [controller].
+        Sampled, at the machine's sample time where it has none; another one is taken as it is. A path is that of a file
+        with a table [controller].
     amplitude : float, optional
         Of the motion at the encoder, rad; one count of it, or 1e-6, unless given.
     delay : float, optional
@@ -53,17 +55,20 @@ def stability(
     Raises
     ------
     InputError
-        If the controller acts in continuous time, a law is not smooth about rest, or a number is out of bounds.
+        If the controller acts in continuous time and the axis has no sample time, a law is not smooth about rest, or a
+        number is out of bounds.
     """
     if amplitude is not None and not 0.0 < amplitude < math.inf:
         raise InputError(f"stability: amplitude = {amplitude:g} rad must be greater than 0 and finite")
     at_hand = load_machine(machine) if isinstance(machine, (str, os.PathLike)) else machine
     models = dict(at_hand.models) if isinstance(at_hand, Machine) else dict[str, Model]()
+    sample_time = at_hand.sample_time if isinstance(at_hand, Machine) else 0.0
     held = (
         controller
         if isinstance(controller, Controller)
-        else read_controller(controller, at_hand.inertia, models)
+        else read_controller(controller, at_hand.inertia, models, sample_time)
     )
+    held = replace(held, sample_time=held.sample_time or sample_time)
     plant = at_hand
     if isinstance(plant, RigidAxis):
         plant = Plant(plant.inertia, plant.friction).built(

@@ -15,6 +15,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.learned import refuse_others, write_table
 from stickslip.control.learning import AngleTable, TimeTable, low_pass
 from stickslip.control.position import position_feedforward
+from stickslip.control.sample_time import sampled_by
 from stickslip.control.written import tables_of
 from stickslip.errors import InputError, UnknownName
 from stickslip.machines.position_map import PositionMap
@@ -137,7 +138,7 @@ class Learn(Track):
         rows = yield Step(setpoints(round(0.05 / rig.sample_time)), pause=self.wait)
         motion = self.samples(rig)
         path = np.column_stack([float(rows[-1, POSITION]) + motion[:, 0], motion[:, 1:]])
-        own = with_more(replace(self.made(rig), sample_time=rig.sample_time), self.mapped())
+        own = with_more(sampled_by(self.made(rig), rig.sample_time, "rig"), self.mapped())
         table = self.table(rig, path, own.torque_limit)
         least, best, uncertainty = math.inf, own, math.nan
         for i in range(1, self.times + 1):

@@ -119,7 +119,7 @@ class Track(Procedure):
         """
         if not self.controller:
             return self.catalogued(rig) if self.compensator in MADE else self.compensated(rig)
-        found = read_controller(self.controller, self.inertia, models_of(rig))
+        found = read_controller(self.controller, self.inertia, models_of(rig), rig.sample_time)
         limit = ROOM * rig.limits.torque
         return dataclasses.replace(found, torque_limit=min(found.torque_limit, limit))
 

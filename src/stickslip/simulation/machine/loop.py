@@ -16,6 +16,7 @@ import numpy as np
 import stickslip
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
+from stickslip.control.sample_time import sampled_by
 from stickslip.errors import Divergence, InputError
 from stickslip.jit import compiled_profile, flat
 from stickslip.machines.machine import Machine
@@ -143,13 +144,8 @@ def sampled_on(
     InputError
         If it is meant for another sample time, or brings an encoder of its own.
     """
-    if controller.sample_time not in (0.0, machine.sample_time):
-        raise InputError(
-            f"controller: sample_time = {controller.sample_time:g} s, that of the machine {machine.name} is "
-            f"{machine.sample_time:g} s; give the machine's, or none"
-        )
-    own = _filtered_as(controller, machine)
-    own = replace(ruled_in(own, slip_rule), sample_time=machine.sample_time)
+    own = sampled_by(controller, machine.sample_time, f"machine {machine.name}")
+    own = ruled_in(_filtered_as(own, machine), slip_rule)
     return compiled(own), {**own.described(), "laws": own.frictions}
 
 
@@ -164,7 +160,7 @@ def _filtered_as(controller: Controller, machine: Machine) -> Controller:
     if compensator is None:
         return controller
     compensator = replace(compensator, filter_hz=compensator.filter_hz or machine.filter or None)
-    return replace(controller, sample_time=machine.sample_time, compensator=compensator)
+    return replace(controller, compensator=compensator)
 
 
 def rows_at(
