@@ -18,6 +18,7 @@ import command_pages
 import example_pages
 import failure_pictures
 import law_pages
+import machine_page
 import nomenclature_page
 import reference_pages
 import sessions
@@ -94,7 +95,7 @@ def package_hash() -> str:
 
 
 MAKERS = (
-    law_pages.make, reference_pages.make, command_pages.make, nomenclature_page.make, api_pages.make,
+    law_pages.make, reference_pages.make, machine_page.make, command_pages.make, nomenclature_page.make, api_pages.make,
     example_pages.make, failure_pictures.make, study_page.make, target_pages.make,
 )  # fmt: skip
 

@@ -98,6 +98,13 @@ def refuse_unknown(
             raise ConfigError(f"{table.label(key)}: {described.name} has no parameter {key!r}; {remedy}")
 
 
+def written(model: Model) -> dict[str, Any]:
+    """The table of a model: its law, choices and parameters. A law that is not registered is named by its file."""
+    law = model.law
+    name = law.name if law.name in plugins.law_names() else str(law.written["step"].__code__.co_filename)
+    return {**model.as_dict(), "law": name}
+
+
 def _law(table: Table, laws: Mapping[str, Law]) -> Law:
     name = table.text("law")
     if name.endswith(".py"):

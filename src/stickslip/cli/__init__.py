@@ -25,7 +25,7 @@ from stickslip.verbs.kinds import require
 
 VERBS = (
     "study", "sweep", "tune", "simulate", "learn", "identify", "doctor", "analyse", "compare", "recommend", "demo",
-    "rig", "laws", "law", "cite", "rerun", "export", "web", "warm-up", "version"
+    "rig", "machine", "laws", "law", "cite", "rerun", "export", "web", "warm-up", "version"
 )  # fmt: skip
 
 
@@ -41,6 +41,7 @@ CODE = (
     "cite",
     "rerun",
     "export",
+    "machine",
 )
 """Verbs that read TOML files in which laws may be named; `rig` and `analyse` have the option in their actions."""
 WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
@@ -53,7 +54,8 @@ WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "learn": {"file": ("simulation", "model")},
     "study": {"study": ("study",)},
     "export": {"file": ("model", "simulation", "map")},
-    "rig": {"rig": ("rig",)},
+    "rig": {"rig": ("rig", "machine")},
+    "machine": {"name": ("machine",)},
 }
 """Per verb and argument, the kinds of file that it takes, or knows better what to say of; records are looked at where
 they are read."""

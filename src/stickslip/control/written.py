@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stickslip import plugins
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.registry import control_law_names
 from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.model import Model
-from stickslip.spec import Law
+from stickslip.model_tables import written
 
 
 def tables_of(controller: Controller) -> dict[str, Any]:
@@ -49,14 +48,9 @@ def _block(part: str, block: ControlBlock, held: dict[str, Any]) -> dict[str, An
 
 def _model(model: Model) -> dict[str, Any]:
     """The table of a friction law; the slip rule belongs to a whole run."""
-    table = {**model.as_dict(), "law": _named(model.law, plugins.law_names())}
-    table.pop("slip_rule", None)
-    return table
+    return {name: value for name, value in written(model).items() if name != "slip_rule"}
 
 
-def _named(law: Law | ControlLaw, known: Any) -> str:
+def _named(law: ControlLaw, known: Any) -> str:
     """By what a file calls a law: its name, or the path of its file."""
-    if law.name in known:
-        return law.name
-    function = law.written["sample" if isinstance(law, ControlLaw) else "step"]
-    return str(function.__code__.co_filename)
+    return law.name if law.name in known else str(law.written["sample"].__code__.co_filename)

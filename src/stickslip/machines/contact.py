@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 from stickslip.arguments import insist_on_own
+from stickslip.description import Par
 from stickslip.errors import ParameterError
+from stickslip.machines.described import described
 from stickslip.machines.motor import Harmonics
 from stickslip.model import Model
 
@@ -21,17 +23,18 @@ LEVELS = ("fs", "fc", "alpha0", "beta0", "curve_torque")
 NONE = Harmonics()
 
 
+@described
 @dataclass(frozen=True)
 class Bearings:
-    """Coulomb and viscous friction of the shaft's and the motor's bearings, between motor and torque sensor.
+    """Coulomb and viscous friction of the shaft's and the motor's bearings, between motor and torque sensor."""
 
-    ``coulomb`` (N·m) is approached over a displacement as in Dahl's law, whose ``stiffness`` (N·m/rad) a bearing has at
-    rest; ``viscous`` in N·m·s/rad.
-    """
-
-    coulomb: float = 0.0
-    viscous: float = 0.0
-    stiffness: float = 5.0
+    coulomb: Annotated[
+        float, Par("N·m", "", "friction that is approached over a displacement as in Dahl's law", lower=0.0)
+    ] = 0.0
+    viscous: Annotated[float, Par("N·m·s/rad", "", "viscous friction coefficient", lower=0.0)] = 0.0
+    stiffness: Annotated[
+        float, Par("N·m/rad", "", "slope of that friction over the displacement from rest", positive=True)
+    ] = 5.0
 
     def __post_init__(self) -> None:
         insist_on_own(self, "bearings")
@@ -45,14 +48,14 @@ class Bearings:
             )
 
 
+@described
 @dataclass(frozen=True)
 class Drift:
-    """Change of friction after the machine was switched on: from ``begin`` (s) on a factor
-    1 + change (1 - exp(-(t - begin) / time))."""
+    """Change of friction after the machine was switched on: a factor 1 + change (1 - exp(-(t - begin) / time))."""
 
-    change: float = 0.0
-    time: float = 1800.0
-    begin: float = 0.0
+    change: Annotated[float, Par("-", "", "part by which friction has changed in the end", upper=10.0)] = 0.0
+    time: Annotated[float, Par("s", "", "time constant", positive=True)] = 1800.0
+    begin: Annotated[float, Par("s", "", "when the change begins", lower=0.0)] = 0.0
 
     def __post_init__(self) -> None:
         insist_on_own(self, "drift")
@@ -64,18 +67,21 @@ class Drift:
             raise ParameterError(f"drift: begin = {self.begin:g} s must be a finite number of at least 0")
 
 
+@described
 @dataclass(frozen=True)
 class Heat:
-    """How warm the contact gets and what that does: a factor exp(coefficient (T - reference)).
+    """How warm the contact gets and what that does: a factor exp(coefficient (T - reference)) on friction.
 
     The temperature follows ``ambient`` plus ``resistance`` times the power of friction, delayed by ``time``.
     """
 
-    coefficient: float = 0.0
-    reference: float = 20.0
-    ambient: float = 20.0
-    resistance: float = 0.0
-    time: float = 600.0
+    coefficient: Annotated[
+        float, Par("1/K", "", "relative change of friction with temperature", lower=-0.1, upper=0.1)
+    ] = 0.0
+    reference: Annotated[float, Par("°C", "", "temperature at which friction is as written")] = 20.0
+    ambient: Annotated[float, Par("°C", "", "temperature without friction, and at the start")] = 20.0
+    resistance: Annotated[float, Par("K/W", "", "rise of temperature per power of friction", lower=0.0)] = 0.0
+    time: Annotated[float, Par("s", "", "time constant of the temperature", positive=True)] = 600.0
 
     def __post_init__(self) -> None:
         insist_on_own(self, "heat")

@@ -4,38 +4,36 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from stickslip.arguments import insist_on_own
+from stickslip.description import Par
 from stickslip.errors import ParameterError
+from stickslip.machines.described import described
 
 
+@described
 @dataclass(frozen=True)
 class Encoder:
     """What the position is read with.
 
-    Attributes
-    ----------
-    counts : float
-        Per revolution, after quadrature; 0 reads exactly.
-    noise : float
-        Of the reading before it is counted, rad RMS.
-    max_speed : float
-        rad/s, above which it loses counts: the drive switches off there.
-    mode : float
-        Frequency of its mounting's mode, Hz; 0 for none.
-    mode_damping : float
-        Part of critical damping.
-    mode_share : float
-        How much of the reading the mode carries: (1 - share) theta + share q, with q the position of a mass that
-        follows theta through the mode. At resonance the reading is about share / (2 damping) times the shaft's motion.
+    Its mounting may have a mode: the reading is (1 - share) theta + share q, with q the position of a mass that follows
+    theta through the mode. At resonance it is about share / (2 damping) times the shaft's motion.
     """
 
-    counts: float = 0.0
-    noise: float = 0.0
-    max_speed: float = math.inf
-    mode: float = 0.0
-    mode_damping: float = 0.02
-    mode_share: float = 0.0
+    counts: Annotated[
+        float, Par("-", "", "counts per revolution, after quadrature; 0 reads exactly", lower=0.0)
+    ] = 0.0
+    noise: Annotated[float, Par("rad", "", "RMS noise of the reading before it is counted", lower=0.0)] = 0.0
+    max_speed: Annotated[
+        float,
+        Par("rad/s", "", "speed above which it loses counts: the drive switches off there", positive=True),
+    ] = math.inf
+    mode: Annotated[float, Par("Hz", "", "frequency of its mounting's mode; 0 for none", lower=0.0)] = 0.0
+    mode_damping: Annotated[float, Par("-", "", "part of the mode's critical damping", positive=True)] = 0.02
+    mode_share: Annotated[
+        float, Par("-", "", "part of the reading that the mode carries", lower=0.0, upper=1.0)
+    ] = 0.0
 
     def __post_init__(self) -> None:
         insist_on_own(self, "encoder")

@@ -1,8 +1,10 @@
-"""Reading a machine from the TOML file that describes it; those of the package lie in ``machines/library``."""
+"""Reading a machine from the TOML file that describes it; those of the package lie in ``machines/library``.
+
+`stickslip.machines.keys` has the keys of such a file, `stickslip.machines.written` writes one.
+"""
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -11,13 +13,15 @@ from typing import Any, cast
 from stickslip import plugins
 from stickslip.arguments import arguments_checked
 from stickslip.config import Table, read_toml
-from stickslip.errors import ConfigError, UnknownName
+from stickslip.errors import UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.flexible import FlexibleAxis
+from stickslip.machines.keys import BY_NAME
 from stickslip.machines.machine import Machine, Sensor
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
 from stickslip.model import Model
+from stickslip.model_tables import model
 
 LIBRARY = Path(__file__).parent / "library"
 """Where the package's own machines lie."""
@@ -38,11 +42,22 @@ def machine(name: str | os.PathLike[str]) -> Machine:
     UnknownName, ConfigError
         If there is none; a key or value that cannot be used, by name.
     """
+    return _read(file_of(name))
+
+
+def file_of(name: str | os.PathLike[str]) -> Path:
+    """The file of the machine of that name, or at that path.
+
+    Raises
+    ------
+    UnknownName
+        If there is no machine of that name.
+    """
     text = os.fspath(name)
     if text in library():
-        return _read(LIBRARY / f"{text}.toml")
+        return LIBRARY / f"{text}.toml"
     if text.endswith(".toml"):
-        return _read(Path(text))
+        return Path(text)
     raise UnknownName("machine", text, library())
 
 
@@ -65,15 +80,15 @@ def load_machine(name: str | os.PathLike[str]) -> Machine:
 def _read(path: Path) -> Machine:
     with read_toml(path) as top, top.blamed():
         friction, notes = _friction(top.table("friction")), _notes(top)
-        inertia = top.positive("inertia", "kg·m²")
+        own = BY_NAME[""].read(top)
         flexible, stiffness = _flexible(top)
         contact = _contact_of(top, friction)
+        cogging = _part(top, "cogging")
         return Machine(
-            path.stem, inertia, contact, top.text("title", ""), flexible, stiffness, _amplifier_of(top), _cogging(top),
-            _encoder(top), _sensor(top), top.number("delay", "samples", 0.0),
-            top.number("velocity_filter", "Hz", 0.0, 0.0), top.positive("sample_time", "s", 1e-3),
-            int(top.number("seed", "", 0.0, 0.0)), _limits(top), _models(top), notes,
-            start_angle=top.number("start_angle", "rad", 0.0),
+            path.stem, contact=contact, title=top.text("title", ""), flexible=flexible, flexible_stiffness=stiffness,
+            amplifier=_amplifier_of(top), cogging=Harmonics(**cogging) if cogging else Harmonics(),
+            encoder=Encoder(**_part(top, "encoder")), sensor=_sensor(top), limits=_limits(top), models=_models(top),
+            notes=notes, **own,
         )  # fmt: skip
 
 
@@ -87,6 +102,9 @@ def _notes(top: Table) -> tuple[str, ...]:
 
 
 def _friction(table: Table) -> Model:
+    if isinstance(table.values.get("law"), dict):  # the model of an identification, by its file
+        with table:
+            return model(table, {})
     with table, table.blamed():
         name = table.text("law")
         law = plugins.law(
@@ -98,134 +116,68 @@ def _friction(table: Table) -> Model:
         return Model(law, choices, **table.rest())
 
 
-def _part(top: Table, key: str) -> Table | None:
-    return top.table(key) if top.has(key) else None
+def _part(top: Table, name: str) -> dict[str, Any]:
+    """The numbers of a table, by the fields of what they make; empty where the file has no such table."""
+    if not top.has(name):
+        return {}
+    with top.table(name) as table:
+        return BY_NAME[name].read(table)
 
 
 def _flexible(top: Table) -> tuple[FlexibleAxis | None, float]:
-    if (table := _part(top, "flexible")) is None:
-        return None, 0.0
-    with table, table.blamed():
-        axis = FlexibleAxis(
-            table.positive("rotor", "kg·m²"), table.positive("shaft", "kg·m²"), table.positive("disk", "kg·m²"),
-            table.positive("coupling_stiffness", "N·m/rad"), table.positive("shaft_stiffness", "N·m/rad"),
-            table.number("damping", "", 0.0),
-        )  # fmt: skip
-        return axis, table.number("contact_stiffness", "N·m/rad", 0.0, 0.0)
+    own = _part(top, "flexible")
+    stiffness = own.pop("flexible_stiffness", 0.0)
+    return (FlexibleAxis(**own) if own else None), stiffness
 
 
 def _contact_of(top: Table, friction: Model) -> Contact:
-    bearings, drift, heat, direction = Bearings(), Drift(), Heat(), (1.0, 1.0)
-    if (table := _part(top, "bearings")) is not None:
-        with table, table.blamed():
-            bearings = Bearings(
-                table.number("coulomb", "N·m", 0.0), table.number("viscous", "N·m·s/rad", 0.0),
-                table.positive("stiffness", "N·m/rad", 5.0),
-            )  # fmt: skip
-    if (table := _part(top, "drift")) is not None:
-        with table, table.blamed():
-            drift = Drift(
-                table.number("change", ""), table.positive("time", "s", 1800.0),
-                table.number("begin", "s", 0.0, 0.0),
-            )  # fmt: skip
-    if (table := _part(top, "heat")) is not None:
-        with table, table.blamed():
-            heat = Heat(
-                table.number("coefficient", "1/K"), table.number("reference", "°C", 20.0),
-                table.number("ambient", "°C", 20.0), table.number("resistance", "K/W", 0.0),
-                table.positive("time", "s", 600.0),
-            )  # fmt: skip
-    if (table := _part(top, "direction")) is not None:
-        with table:
-            direction = (table.positive("positive", ""), table.positive("negative", ""))
-    plain = Contact(friction, Harmonics(), direction, bearings, drift, heat)
+    bearings, drift, heat = (_part(top, name) for name in ("bearings", "drift", "heat"))
+    factors = _part(top, "direction")
+    direction = (factors["positive"], factors["negative"]) if factors else (1.0, 1.0)
+    plain = Contact(friction, Harmonics(), direction, Bearings(**bearings), Drift(**drift), Heat(**heat))
     return replace(plain, ripple=_ripple(top, plain))
 
 
-def _harmonics(table: Table) -> Harmonics:
-    with table.blamed():
-        columns = {key: _numbers(table, key) for key in ("order", "amplitude", "phase")}
-        return Harmonics(columns["order"], columns["amplitude"], columns["phase"])
-
-
-def _numbers(table: Table, key: str) -> tuple[float, ...]:
-    if not table.has(key):
-        raise ConfigError(f"{table.label(key)} is missing; give a list of numbers")
-    values = cast("list[Any]", table.values[key])
-    if not isinstance(table.values[key], list) or not all(_finite(v) for v in values):
-        raise table.error(key, "must be a list of finite numbers")
-    return tuple(float(v) for v in values)
-
-
-def _finite(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-
-
 def _ripple(top: Table, contact: Contact) -> Harmonics:
-    """Relative ripple, from its shape and its peak to peak in N·m at `LEVEL_SPEED`."""
-    if (table := _part(top, "ripple")) is None:
+    """Relative ripple; of one with its peak to peak in N·m at `LEVEL_SPEED`, from its shape."""
+    if not top.has("ripple"):
         return Harmonics()
-    with table:
-        shape = _harmonics(table)
-        peak = table.positive("peak_to_peak", "N·m")
-        clutch = contact.clutch()
-        level = clutch.law.steady(LEVEL_SPEED, clutch.parameters) if clutch.law.steady else 0.0
-        size = shape.peak_to_peak()
-        if not (level > 0.0 and size > 0.0):
-            raise table.error("peak_to_peak", "needs a law that slides and amplitudes that are not all zero")
-        return shape.scaled(peak / (level * size))
-
-
-def _cogging(top: Table) -> Harmonics:
-    if (table := _part(top, "cogging")) is None:
-        return Harmonics()
-    with table:
-        return _harmonics(table)
+    own = _part(top, "ripple")
+    peak = own.pop("peak_to_peak")
+    shape = Harmonics(**own)
+    if not top.table("ripple").has("peak_to_peak"):
+        return shape
+    clutch = contact.clutch()
+    level = clutch.law.steady(LEVEL_SPEED, clutch.parameters) if clutch.law.steady else 0.0
+    size = shape.peak_to_peak()
+    if not (level > 0.0 and size > 0.0):
+        raise top.table("ripple").error(
+            "peak_to_peak", "needs a law that slides and amplitudes that are not all zero"
+        )
+    return shape.scaled(peak / (level * size))
 
 
 def _amplifier_of(top: Table) -> Amplifier:
-    if (table := _part(top, "amplifier")) is None:
+    if not (own := _part(top, "amplifier")):
         return Amplifier(1.0)
-    with table, table.blamed():
-        bits, reach = int(table.number("bits", "", 0.0, 0.0)), table.positive("range", "A", 1.0)
-        converter = Converter(bits, reach)
-        return Amplifier(
-            table.positive("torque_constant", "N·m/A"), _or_infinite(table, "current_limit", "A"),
-            _or_infinite(table, "bandwidth", "Hz"), converter, converter, table.number("current_noise", "A", 0.0),
-            table.number("monitor_noise", "A", 0.0),
-        )  # fmt: skip
-
-
-def _or_infinite(table: Table, key: str, unit: str) -> float:
-    return table.positive(key, unit) if table.has(key) else math.inf
-
-
-def _encoder(top: Table) -> Encoder:
-    if (table := _part(top, "encoder")) is None:
-        return Encoder()
-    with table, table.blamed():
-        return Encoder(
-            table.number("counts", "", 0.0), table.number("noise", "rad", 0.0),
-            _or_infinite(table, "max_speed", "rad/s"),
-            table.number("mode", "Hz", 0.0), table.number("mode_damping", "", 0.02),
-            table.number("mode_share", "", 0.0),
-        )  # fmt: skip
+    converter = _converter(own)
+    return Amplifier(command=converter, monitor=converter, **own)
 
 
 def _sensor(top: Table) -> Sensor:
-    if (table := _part(top, "torque_sensor")) is None:
-        return Sensor()
-    with table, table.blamed():
-        bits, reach = int(table.number("bits", "", 0.0, 0.0)), table.positive("range", "N·m", 1.0)
-        return Sensor(table.number("noise", "N·m", 0.0, 0.0), Converter(bits, reach))
+    own = _part(top, "torque_sensor")
+    return Sensor(converter=_converter(own), **own) if own else Sensor()
+
+
+def _converter(own: dict[str, Any]) -> Converter:
+    """Takes its numbers out of those of a table; the range of an exact one is of no account."""
+    bits, reach = own.pop("bits"), own.pop("range")
+    return Converter(bits, reach) if bits else Converter()
 
 
 def _limits(top: Table) -> dict[str, float]:
-    if (table := _part(top, "limits")) is None:
-        return {}
-    units = {"torque": "N·m", "temperature": "°C", "following_error": "rad", "stop_time": "s"}
-    with table:
-        return {key: table.positive(key, unit) for key, unit in units.items() if table.has(key)}
+    found = _part(top, "limits")
+    return {name: value for name, value in found.items() if name in top.values["limits"]}
 
 
 def _models(top: Table) -> dict[str, Model]:

@@ -7,34 +7,36 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
+from stickslip.arguments import insist_on_own
+from stickslip.description import Par
 from stickslip.errors import ParameterError
+from stickslip.machines.described import described
 from stickslip.machines.drivetrain import Chain
 
 
+@described
 @dataclass(frozen=True)
 class FlexibleAxis:
-    """Rotor, shaft and disk, with the coupling and the shaft as springs between them.
+    """Rotor, shaft and disk, with the coupling and the shaft as springs between them."""
 
-    Attributes
-    ----------
-    rotor, shaft, disk : float
-        J_1, J_2, J_3, kg·m²: rotor with half of the coupling; the other half with encoder and shaft up to the disk; the
-        rest of the shaft with the friction disk.
-    coupling, elasticity : float
-        k_1 between rotor and shaft, k_2 between shaft and disk, N·m/rad.
-    damping : float
-        Part of critical damping of each spring with the inertias beside it.
-    """
-
-    rotor: float
-    shaft: float
-    disk: float
-    coupling: float
-    elasticity: float
-    damping: float = 0.0
+    rotor: Annotated[float, Par("kg·m²", "J_1", "rotor with half of the coupling", positive=True)]
+    shaft: Annotated[
+        float,
+        Par(
+            "kg·m²", "J_2", "the coupling's other half, with encoder and shaft up to the disk", positive=True
+        ),
+    ]
+    disk: Annotated[float, Par("kg·m²", "J_3", "the rest of the shaft with the friction disk", positive=True)]
+    coupling: Annotated[float, Par("N·m/rad", "k_1", "spring between rotor and shaft", positive=True)]
+    elasticity: Annotated[float, Par("N·m/rad", "k_2", "spring between shaft and disk", positive=True)]
+    damping: Annotated[
+        float, Par("-", "", "part of critical damping of each spring with the inertias beside it", lower=0.0)
+    ] = 0.0
 
     def __post_init__(self) -> None:
+        insist_on_own(self, "flexible axis")
         for name, unit in (
             ("rotor", "kg·m²"), ("shaft", "kg·m²"), ("disk", "kg·m²"), ("coupling", "N·m/rad"),
             ("elasticity", "N·m/rad"),

@@ -7,14 +7,18 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, cast
+from pathlib import Path
+from typing import Annotated, Any, cast
 
 from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
+from stickslip.description import Par
 from stickslip.errors import ParameterError, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
+from stickslip.machines.described import described
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.flexible import FlexibleAxis
@@ -24,11 +28,18 @@ from stickslip.model import Model
 UNITY, NONE, EXACT, EXACTLY = Amplifier(1.0), Harmonics(), Encoder(), Converter()
 
 
+@described
 @dataclass(frozen=True)
 class Sensor:
-    """The torque sensor at the clutch: noise (N·m RMS) and converter (N·m)."""
+    """The torque sensor at the clutch.
 
-    noise: float = 0.0
+    Attributes
+    ----------
+    converter : Converter
+        What its signal goes to, N·m.
+    """
+
+    noise: Annotated[float, Par("N·m", "", "RMS noise", lower=0.0)] = 0.0
     converter: Converter = EXACTLY
 
 
@@ -36,6 +47,7 @@ SILENT = Sensor()
 
 
 @constructor_named
+@described
 @dataclass(frozen=True)
 class Machine:
     """A virtual machine.
@@ -43,30 +55,15 @@ class Machine:
     Attributes
     ----------
     name, title : str
-    inertia : float
-        Of the whole axis, kg·m².
     flexible : FlexibleAxis or None
         None: rigid.
     contact : Contact
         Its law holds as seen at the encoder: printed values.
-    flexible_stiffness : float
-        Total stiffness of the contact of the flexible machine, N·m/rad (its springs keep their ratios); 0 leaves it.
-        The encoder sees it in series with the shaft.
     amplifier : Amplifier
     cogging : Harmonics
         N·m
     encoder : Encoder
     sensor : Sensor
-    delay : float
-        Part of a sample by which a command acts late, from 0 to 1 (in whole sub-steps).
-    filter : float
-        Corner of the low-pass on the velocity that feedback compensators see by default, Hz; 0 for none.
-    sample_time : float
-        s
-    seed : int
-        Of every noise.
-    start_angle : float
-        Angle of the shaft where positions count from, rad: where a run meets ripple and cogging.
     limits : mapping of str to float
         ``torque``, ``temperature``, ``following_error``, ``stop_time``: what a rig of this machine declares.
     models : mapping of str to Model
@@ -78,24 +75,45 @@ class Machine:
     """
 
     name: str
-    inertia: float
+    inertia: Annotated[float, Par("kg·m²", "J", "inertia of the whole axis", positive=True)]
     contact: Contact
     title: str = ""
     flexible: FlexibleAxis | None = None
-    flexible_stiffness: float = 0.0
+    flexible_stiffness: Annotated[
+        float,
+        Par(
+            "N·m/rad",
+            "",
+            "total stiffness of the contact at the disk, its springs' ratios kept; 0 leaves it as the law has it",
+            lower=0.0,
+        ),
+    ] = 0.0
     amplifier: Amplifier = UNITY
     cogging: Harmonics = NONE
     encoder: Encoder = EXACT
     sensor: Sensor = SILENT
-    delay: float = 0.0
-    filter: float = 0.0
-    sample_time: float = 1e-3
-    seed: int = 0
+    delay: Annotated[
+        float, Par("samples", "", "part of a sample by which a command acts late", lower=0.0, upper=1.0)
+    ] = 0.0
+    filter: Annotated[
+        float,
+        Par(
+            "Hz",
+            "",
+            "corner of the low-pass on the velocity that feedback sees by default; 0 for none",
+            lower=0.0,
+        ),
+    ] = 0.0
+    sample_time: Annotated[float, Par("s", "T", "sample time of its controller", positive=True)] = 1e-3
+    seed: Annotated[int, Par("-", "", "seed of every noise", lower=0.0, whole=True)] = 0
     limits: Mapping[str, float] = field(default_factory=dict[str, float])
     models: Mapping[str, Model] = field(default_factory=dict[str, Model])
     notes: tuple[str, ...] = ()
     switched_off: tuple[str, ...] = ()
-    start_angle: float = 0.0
+    start_angle: Annotated[
+        float,
+        Par("rad", "", "angle of the shaft where positions count from: where a run meets ripple and cogging"),
+    ] = 0.0
 
     def __post_init__(self) -> None:
         insist_on_own(self, "machine")
@@ -207,6 +225,24 @@ class Machine:
             amplifier=self.amplifier.bandwidth,
             bearings=bearings or LinearContact(0.0, self.contact.bearings.viscous),
         )
+
+    @arguments_checked
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the TOML file that `stickslip.load_machine` reads; its name is the machine's there.
+
+        Parameters
+        ----------
+        path : path
+            Ends with .toml. A file that is there is overwritten.
+
+        Raises
+        ------
+        InputError
+            If it does not, the file cannot be written, or the amplifier's two converters differ: a file has one.
+        """
+        from stickslip.machines.written import write_machine
+
+        return write_machine(self, path)
 
     @arguments_checked
     def without(self, *names: str) -> Machine:

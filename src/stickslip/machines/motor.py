@@ -4,20 +4,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from stickslip.arguments import insist_on_own
+from stickslip.description import Par
 from stickslip.errors import ParameterError
+from stickslip.machines.described import described
 
 HIGHEST = 4096
 """Order, at most: 24 slots behind a gear of 1:50 have 1200 at the output."""
 
 
+@described
 @dataclass(frozen=True)
 class Converter:
-    """An analogue output or input of so many bits over plus and minus a range; 0 bits convert exactly."""
+    """An analogue output or input of so many bits over plus and minus a range."""
 
-    bits: int = 0
-    range: float = math.inf
+    bits: Annotated[
+        int, Par("-", "", "bits of the converter; 0 converts exactly", lower=0.0, upper=52.0, whole=True)
+    ] = 0
+    range: Annotated[
+        float, Par("-", "", "largest value that it converts, in the unit of what it converts", positive=True)
+    ] = math.inf
 
     def __post_init__(self) -> None:
         insist_on_own(self, "converter")
@@ -32,33 +40,34 @@ class Converter:
         return 2.0 * self.range / 2.0**self.bits if self.bits else 0.0
 
 
+@described
 @dataclass(frozen=True)
 class Amplifier:
     """A current amplifier with its motor.
 
     Attributes
     ----------
-    torque_constant : float
-        N·m/A
-    current_limit : float
-        A, where the current saturates.
-    bandwidth : float
-        Of the current loop, Hz (first order); infinite follows at once.
     command, monitor : Converter
         What the command comes from and the measured current goes to, A.
-    current_noise : float
-        Of the current itself, A RMS, drawn anew for every sample.
-    monitor_noise : float
-        Of the measured current alone, A RMS.
     """
 
-    torque_constant: float
-    current_limit: float = math.inf
-    bandwidth: float = math.inf
+    torque_constant: Annotated[float, Par("N·m/A", "", "torque per current", positive=True)]
+    current_limit: Annotated[float, Par("A", "", "current at which it saturates", positive=True)] = math.inf
+    bandwidth: Annotated[
+        float,
+        Par(
+            "Hz",
+            "",
+            "corner of the current loop, of first order; without one it follows at once",
+            positive=True,
+        ),
+    ] = math.inf
     command: Converter = Converter()
     monitor: Converter = Converter()
-    current_noise: float = 0.0
-    monitor_noise: float = 0.0
+    current_noise: Annotated[
+        float, Par("A", "", "RMS noise of the current itself, drawn anew for every sample", lower=0.0)
+    ] = 0.0
+    monitor_noise: Annotated[float, Par("A", "", "RMS noise of the measured current alone", lower=0.0)] = 0.0
 
     def __post_init__(self) -> None:
         insist_on_own(self, "amplifier")
@@ -70,16 +79,18 @@ class Amplifier:
                 raise ParameterError(f"amplifier: {name} = {getattr(self, name):g} A must be at least 0")
 
 
+@described
 @dataclass(frozen=True)
 class Harmonics:
     """A sum of amplitude_k cos(order_k theta + phase_k) over a revolution.
 
-    Cogging of a motor (amplitudes in N·m), or what a contact's friction varies by (relative).
+    Cogging of a motor (amplitudes in N·m), or what a contact's friction varies by (relative): three lists of equal
+    length.
     """
 
-    order: tuple[float, ...] = ()
-    amplitude: tuple[float, ...] = ()
-    phase: tuple[float, ...] = ()
+    order: Annotated[tuple[float, ...], Par("-", "", "waves a revolution, whole numbers from 1 to 4096")] = ()
+    amplitude: Annotated[tuple[float, ...], Par("-", "", "size of each")] = ()
+    phase: Annotated[tuple[float, ...], Par("rad", "", "where in its wave each is at angle 0")] = ()
 
     def __post_init__(self) -> None:
         insist_on_own(self, "harmonics")

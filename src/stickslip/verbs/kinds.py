@@ -20,6 +20,10 @@ WORDS = {
     "tuning": ("a sweep with a table [tune]", "a sweep with a table [tune]"),
     "simulation": ("a simulation", "a simulation (tables [friction], [reference], [controller])"),
     "rig": ("a rig", "a rig (a machine's name, its TOML file, or one with a table [rig])"),
+    "machine": (
+        "a machine",
+        "a machine (`inertia`, a table [friction] and more: `stickslip machine --template`)",
+    ),
     "report": ("a report", "a report"),
 }
 """Each kind in two or three words, and how one that is asked for is described."""
@@ -32,6 +36,7 @@ TAKEN_BY = {
     "tuning": "`stickslip tune {0}` runs it",
     "simulation": "`stickslip simulate {0}` runs it",
     "rig": "`stickslip rig run NAME --rig {0}` runs a procedure on it",
+    "machine": '`stickslip machine {0}` says what it is, and a table [machine] with `machine = "{0}"` runs it',
     "report": "a browser shows it",
 }
 RECORDS = {
@@ -65,6 +70,8 @@ def kind_of_toml(table: Mapping[str, Any]) -> str:
     if "rig" in table:
         return "rig"
     friction = table.get("friction")
+    if isinstance(friction, dict) and "inertia" in table:
+        return "machine"
     if "reference" in table and "controller" in table:
         return "simulation"
     return "study" if isinstance(friction, dict) and {"references", "controllers"} & table.keys() else ""
