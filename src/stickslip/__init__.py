@@ -1,7 +1,8 @@
 """stickslip: friction of servo axes, simulated under control and compensated.
 
 From a log to a compensator: `read`, `doctor`, `identify`, `compare`, `recommend`, `export`. Simulation: `Model`,
-`RigidAxis`, `load_machine`, `Controller`, `Reference`, `simulate`, `respond`, `stability`. Many runs: `study`, `sweep`,
+`RigidAxis`, `load_machine`, `Machine` and its parts (`Contact`, `FlexibleAxis`, `Encoder`, ...), `Controller`,
+`Reference`, `simulate`, `respond`, `stability`. Many runs: `study`, `sweep`,
 `tune`, `learn`. Each has its own help, `help(stickslip.identify)`; `identify`, `recommend`, `export`, `study` and
 `sweep` are packages as well, and so stand under PACKAGE CONTENTS rather than FUNCTIONS.
 
@@ -24,8 +25,12 @@ if TYPE_CHECKING:
     from stickslip.control.registry import control_law, control_law_names
     from stickslip.control_spec import ControlLaw
     from stickslip.errors import InputError, SimulationError, StickslipError
+    from stickslip.machines.contact import Bearings, Contact, Drift, Heat
+    from stickslip.machines.encoder import Encoder
     from stickslip.machines.files import load_machine
-    from stickslip.machines.machine import Machine
+    from stickslip.machines.flexible import FlexibleAxis
+    from stickslip.machines.machine import Machine, Sensor
+    from stickslip.machines.motor import Amplifier, Converter, Harmonics
     from stickslip.machines.rigid import RigidAxis
     from stickslip.model import Model, Reference
     from stickslip.plugins import law, law_names
@@ -60,8 +65,12 @@ _HOME = {
         "control.registry": "control_law control_law_names",
         "control_spec": "ControlLaw",
         "errors": "InputError SimulationError StickslipError",
+        "machines.contact": "Bearings Contact Drift Heat",
+        "machines.encoder": "Encoder",
         "machines.files": "load_machine",
-        "machines.machine": "Machine",
+        "machines.flexible": "FlexibleAxis",
+        "machines.machine": "Machine Sensor",
+        "machines.motor": "Amplifier Converter Harmonics",
         "machines.rigid": "RigidAxis",
         "model": "Model Reference",
         "plugins": "law law_names",
@@ -85,14 +94,23 @@ _HOME = {
 """Where the public names are."""
 
 __all__ = [
+    "Amplifier",
+    "Bearings",
     "Cascade",
+    "Contact",
     "ControlBlock",
     "ControlLaw",
     "Controller",
+    "Converter",
+    "Drift",
+    "Encoder",
     "ExportResult",
     "Feedback",
     "Feedforward",
+    "FlexibleAxis",
     "Gains",
+    "Harmonics",
+    "Heat",
     "IdentificationResult",
     "InputError",
     "Law",
@@ -105,6 +123,7 @@ __all__ = [
     "Record",
     "Reference",
     "RigidAxis",
+    "Sensor",
     "SimulationError",
     "StickslipError",
     "SweepResult",

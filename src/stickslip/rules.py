@@ -18,7 +18,7 @@ KINDS = {
     "Compensator": "Feedforward(...) or Feedback(...)",
     "Controller": "a Controller: of gains, Controller(place('PD', ...)), or of control laws",
     "Gains": "Gains, such as place('PD', ...)",
-    "Machine": "a Machine as load_machine makes it",
+    "Machine": "a Machine: load_machine('thesis-dry'), or built of its parts",
     "Model": "a Model, such as Model('coulomb', fc=0.3)",
     "Reference": "a Reference, of arrays Reference.table(time, position)",
     "ndarray": "a NumPy array",

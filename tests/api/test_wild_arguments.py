@@ -84,6 +84,8 @@ def calls() -> dict[str, Call]:
     swept = SimpleNamespace(folder=Path(), sweep=SimpleNamespace(metrics=[], runs=[1, 2]))
     whole = bare(ss.RecommendationResult)
     return {
+        "Amplifier": Call(ss.Amplifier, {"torque_constant": 0.2, "command": ss.Converter(12, 5.0)}),
+        "Bearings": Call(ss.Bearings, {"coulomb": 0.01}),
         "Cascade": Call(ss.Cascade, {"kv": 10.0, "kvp": 0.1}),
         "ControlBlock": Call(ss.ControlBlock, {"law": "pd", "kp": 1.0, "kd": 0.1}),
         "ControlBlock.function": Call(BLOCK.function, {"name": "sample"}),
@@ -103,9 +105,16 @@ def calls() -> dict[str, Call]:
         "Diagnosis.raise_for_errors": Call(Diagnosis.raise_for_errors, {}, (Diagnosis((), RECORD),)),
         "ExportResult": Call(ss.ExportResult, {"target": target_named("c99"), "name": "x", "files": {}}),
         "ExportResult.save": Call(ss.ExportResult.save, {"folder": "x"}, (bare(ss.ExportResult),)),
+        "Contact": Call(ss.Contact, own(ss.Contact(LAW, bearings=ss.Bearings(0.1)))),
+        "Converter": Call(ss.Converter, {"bits": 12, "range": 5.0}),
+        "Drift": Call(ss.Drift, {"change": 0.1}),
+        "Encoder": Call(ss.Encoder, {"counts": 4096.0}),
         "Feedback": Call(ss.Feedback, {"model": LAW}),
         "Feedforward": Call(ss.Feedforward, {"model": LAW}),
+        "FlexibleAxis": Call(ss.FlexibleAxis, own(ss.FlexibleAxis(1e-4, 1e-4, 1e-4, 1e4, 400.0))),
         "Gains": Call(ss.Gains, {"kp": 1.0}),
+        "Harmonics": Call(ss.Harmonics, {"order": (1.0,), "amplitude": (0.1,), "phase": (0.0,)}),
+        "Heat": Call(ss.Heat, {"coefficient": 0.01}),
         "IdentificationResult": Call(
             ss.IdentificationResult, {"identification": bare(Identification), "sources": ()}
         ),
@@ -125,6 +134,7 @@ def calls() -> dict[str, Call]:
         "Machine": Call(ss.Machine, own(ss.load_machine("thesis-dry"))),
         "Machine.linear": Call(ss.load_machine("thesis-dry").linear, {"bearings": LinearContact(0.0, 0.0)}),
         "Machine.without": Call(ss.load_machine("thesis-dry").without),
+        "Machine.write": Call(ss.load_machine("thesis-dry").write, {"path": "x.toml"}),
         "Mode": Call(ss.Mode, own(par)),
         "Model": Call(ss.Model, {"law": "coulomb", "fc": 0.3}),
         "Model.from_file": Call(ss.Model.from_file, {"path": "x.toml"}),
@@ -145,6 +155,7 @@ def calls() -> dict[str, Call]:
         "Reference.sample": Call(SINE.sample, {"time": [0.0, 1.0]}),
         "Reference.table": Call(ss.Reference.table, {"time": [0.0, 1.0], "position": [0.0, 1.0]}),
         "RigidAxis": Call(ss.RigidAxis, {"inertia": 1e-3, "friction": LAW}),
+        "Sensor": Call(ss.Sensor, {"noise": 0.01}),
         "SweepResult": Call(
             ss.SweepResult, {"sweep": bare(Sweep), "folder": Path(), "rows": [], "manifest": {}, "files": ()}
         ),

@@ -14,7 +14,6 @@ from stickslip.cli import main
 from stickslip.errors import ConfigError, InputError
 from stickslip.machines.files import library
 from stickslip.machines.keys import PARTS
-from stickslip.machines.motor import Amplifier, Converter
 from stickslip.machines.written import machine_text, template
 from support import identified_files
 
@@ -132,7 +131,7 @@ def test_what_a_file_cannot_hold_is_refused(tmp_path: Path) -> None:
     machine = ss.load_machine("ideal")
     with pytest.raises(InputError, match=r"name it mine\.toml"):
         machine.write(tmp_path / "mine.txt")
-    odd = replace(machine, amplifier=Amplifier(1.0, command=Converter(12, 5.0)))
+    odd = replace(machine, amplifier=ss.Amplifier(1.0, command=ss.Converter(12, 5.0)))
     with pytest.raises(InputError, match="a file has one for both"):
         odd.write(tmp_path / "odd.toml")
     with pytest.raises(ConfigError, match="no file"):
@@ -146,3 +145,44 @@ def test_amplitudes_without_a_peak_are_parts_of_friction(tmp_path: Path) -> None
         "[ripple]\norder = [3]\namplitude = [0.1]\nphase = [0.0]\n"
     )
     assert ss.load_machine(file).contact.ripple.amplitude == (0.1,)
+
+
+def test_a_machine_built_of_its_parts_runs_and_comes_again_of_its_file(tmp_path: Path) -> None:
+    axis = ss.FlexibleAxis(1.5e-4, 0.5e-4, 2e-4, coupling=8e3, elasticity=300.0, damping=0.02)
+    converter = ss.Converter(14, 10.0)
+    contact = ss.Contact(
+        ss.Model("coulomb", fc=0.285, sigma2=0.018), ss.Harmonics((3.0,), (0.1,), (0.2,)), (1.0, 0.95),
+        ss.Bearings(0.02, 0.002), ss.Drift(-0.1, 60.0, 1.0), ss.Heat(-0.001, resistance=1.0),
+    )  # fmt: skip
+    machine = ss.Machine(
+        "own", axis.inertia, contact, "Built of parts", axis,
+        amplifier=ss.Amplifier(0.2, 15.0, 1500.0, converter, converter),
+        cogging=ss.Harmonics((12.0,), (0.005,), (0.0,)), encoder=ss.Encoder(65536.0),
+        sensor=ss.Sensor(0.01, ss.Converter(12, 5.0)), delay=0.5,
+        sample_time=5e-4, seed=3, limits={"torque": 2.0}, models={"c": ss.Model("coulomb", fc=0.3)}, notes=("A note.",),
+        start_angle=0.1,
+    )  # fmt: skip
+    assert again(machine, tmp_path) == machine
+    loop = ss.Controller(ss.place("PD", machine.inertia, 20.0))
+    run = ss.simulate(machine, loop, ss.Reference("sine", amplitude=0.05, frequency=2.0), 0.05)
+    assert run.meta["sample_time"] == 5e-4
+
+
+@pytest.mark.parametrize(
+    "name", ["Amplifier", "Converter", "Encoder", "FlexibleAxis", "Harmonics", "Machine", "Sensor"]
+)
+def test_the_help_of_a_part_says_units_and_defaults(name: str) -> None:
+    said = getattr(ss, name).__doc__
+    assert said.count("Attributes\n----------") == 1
+    assert ("Frequency of its mounting's mode; 0 for none (Hz, default 0)." in said) is (name == "Encoder")
+
+
+def test_a_contact_without_springs_has_no_stiffness_to_give() -> None:
+    axis = ss.FlexibleAxis(1.5e-4, 0.5e-4, 2e-4, 8e3, 300.0)
+    contact = ss.Contact(ss.Model("coulomb", fc=0.285))
+    with pytest.raises(
+        ss.InputError, match="flexible_stiffness = 5000 .* law 'coulomb' has none; leave it out"
+    ):
+        ss.Machine("own", axis.inertia, contact, flexible=axis, flexible_stiffness=5e3)
+    with pytest.raises(ss.InputError, match="flexible_stiffness = -1 "):
+        ss.Machine("own", axis.inertia, contact, flexible=axis, flexible_stiffness=-1.0)

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Any, cast
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import constructor_named, insist_on_own
 from stickslip.description import Par
 from stickslip.errors import ParameterError
 from stickslip.machines.described import described
@@ -23,6 +23,7 @@ LEVELS = ("fs", "fc", "alpha0", "beta0", "curve_torque")
 NONE = Harmonics()
 
 
+@constructor_named
 @described
 @dataclass(frozen=True)
 class Bearings:
@@ -48,6 +49,7 @@ class Bearings:
             )
 
 
+@constructor_named
 @described
 @dataclass(frozen=True)
 class Drift:
@@ -67,6 +69,7 @@ class Drift:
             raise ParameterError(f"drift: begin = {self.begin:g} s must be a finite number of at least 0")
 
 
+@constructor_named
 @described
 @dataclass(frozen=True)
 class Heat:
@@ -93,6 +96,7 @@ class Heat:
             )
 
 
+@constructor_named
 @dataclass(frozen=True)
 class Contact:
     """The friction of a machine.

@@ -6,12 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import constructor_named, insist_on_own
 from stickslip.description import Par
 from stickslip.errors import ParameterError
 from stickslip.machines.described import described
 
 
+@constructor_named
 @described
 @dataclass(frozen=True)
 class Encoder:

@@ -9,13 +9,14 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import constructor_named, insist_on_own
 from stickslip.description import Par
 from stickslip.errors import ParameterError
 from stickslip.machines.described import described
 from stickslip.machines.drivetrain import Chain
 
 
+@constructor_named
 @described
 @dataclass(frozen=True)
 class FlexibleAxis:

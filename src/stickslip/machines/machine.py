@@ -28,6 +28,7 @@ from stickslip.model import Model
 UNITY, NONE, EXACT, EXACTLY = Amplifier(1.0), Harmonics(), Encoder(), Converter()
 
 
+@constructor_named
 @described
 @dataclass(frozen=True)
 class Sensor:
@@ -41,6 +42,11 @@ class Sensor:
 
     noise: Annotated[float, Par("N·m", "", "RMS noise", lower=0.0)] = 0.0
     converter: Converter = EXACTLY
+
+    def __post_init__(self) -> None:
+        insist_on_own(self, "sensor")
+        if not (self.noise >= 0.0 and math.isfinite(self.noise)):
+            raise ParameterError(f"sensor: noise = {self.noise:g} N·m must be a finite number of at least 0")
 
 
 SILENT = Sensor()
@@ -126,6 +132,7 @@ class Machine:
                 f"machine: rotor, shaft and disk add up to {self.flexible.inertia:g} kg·m², not to inertia = "
                 f"{self.inertia:g}; make them agree"
             )
+        self._has_springs_to_stiffen()
         if not 0.0 <= self.delay <= 1.0:
             raise ParameterError(f"machine: delay = {self.delay:g} samples must be from 0 to 1")
         if not (self.sample_time > 0.0 and math.isfinite(self.sample_time)):
@@ -135,6 +142,15 @@ class Machine:
         if not math.isfinite(self.start_angle):
             raise ParameterError(f"machine: start_angle = {self.start_angle:g} rad must be a finite number")
         self._positive_up_to_its_speed()
+
+    def _has_springs_to_stiffen(self) -> None:
+        given = f"machine: flexible_stiffness = {self.flexible_stiffness:g} N·m/rad (in a file flexible.contact_stiffness)"
+        if not (self.flexible_stiffness >= 0.0 and math.isfinite(self.flexible_stiffness)):
+            raise ParameterError(f"{given} must be a finite number of at least 0")
+        if self.flexible and self.flexible_stiffness > 0.0 and self.contact_stiffness == 0.0:
+            raise ParameterError(
+                f"{given} is of the contact's springs, and law {self.friction.law.name!r} has none; leave it out"
+            )
 
     def _positive_up_to_its_speed(self) -> None:
         """Friction opposes the motion up to the encoder's speed (beyond 74 rad/s thesis Table 10's does not)."""

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from stickslip.arguments import insist_on_own
+from stickslip.arguments import constructor_named, insist_on_own
 from stickslip.description import Par
 from stickslip.errors import ParameterError
 from stickslip.machines.described import described
@@ -15,6 +15,7 @@ HIGHEST = 4096
 """Order, at most: 24 slots behind a gear of 1:50 have 1200 at the output."""
 
 
+@constructor_named
 @described
 @dataclass(frozen=True)
 class Converter:
@@ -40,6 +41,7 @@ class Converter:
         return 2.0 * self.range / 2.0**self.bits if self.bits else 0.0
 
 
+@constructor_named
 @described
 @dataclass(frozen=True)
 class Amplifier:
@@ -79,6 +81,7 @@ class Amplifier:
                 raise ParameterError(f"amplifier: {name} = {getattr(self, name):g} A must be at least 0")
 
 
+@constructor_named
 @described
 @dataclass(frozen=True)
 class Harmonics:
