@@ -181,7 +181,7 @@ def test_a_contact_without_springs_has_no_stiffness_to_give() -> None:
     axis = ss.FlexibleAxis(1.5e-4, 0.5e-4, 2e-4, 8e3, 300.0)
     contact = ss.Contact(ss.Model("coulomb", fc=0.285))
     with pytest.raises(
-        ss.InputError, match="flexible_stiffness = 5000 .* law 'coulomb' has none; leave it out"
+        ss.InputError, match=r"flexible_stiffness = 5000 .* law 'coulomb' has none; leave it out"
     ):
         ss.Machine("own", axis.inertia, contact, flexible=axis, flexible_stiffness=5e3)
     with pytest.raises(ss.InputError, match="flexible_stiffness = -1 "):

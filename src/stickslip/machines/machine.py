@@ -144,7 +144,9 @@ class Machine:
         self._positive_up_to_its_speed()
 
     def _has_springs_to_stiffen(self) -> None:
-        given = f"machine: flexible_stiffness = {self.flexible_stiffness:g} N·m/rad (in a file flexible.contact_stiffness)"
+        given = (
+            f"machine: flexible_stiffness = {self.flexible_stiffness:g} N·m/rad (contact_stiffness in a file)"
+        )
         if not (self.flexible_stiffness >= 0.0 and math.isfinite(self.flexible_stiffness)):
             raise ParameterError(f"{given} must be a finite number of at least 0")
         if self.flexible and self.flexible_stiffness > 0.0 and self.contact_stiffness == 0.0:
