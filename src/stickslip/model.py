@@ -172,11 +172,12 @@ def _model(law: Law, values: Mapping[str, Any]) -> Model:
     return Model(law, **values)
 
 
-def level_of_caller() -> int:
+def level_of_caller(between: int = 3) -> int:
     """The ``stacklevel`` of whoever called the constructor that asks, behind `dataclasses.replace` too; 0 where it was
-    the package itself: a fit tries many models that nobody has written."""
-    frame, level = inspect.currentframe(), 3
-    for _ in range(3):  # this function, the constructor, what checks its arguments
+    the package itself: a fit tries many models that nobody has written. `between` are the frames from this function to
+    the caller's: itself, the constructor, what checks its arguments; of a dataclass also its ``__post_init__``."""
+    frame, level = inspect.currentframe(), between
+    for _ in range(between):
         frame = frame.f_back if frame else None
     while frame is not None and frame.f_globals.get("__name__") in ("dataclasses", "copy"):  # their `replace`
         frame, level = frame.f_back, level + 1

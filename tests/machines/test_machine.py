@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import stickslip as ss
 from stickslip.analyse.flexibility import lowest_first_mode
-from stickslip.errors import ConfigError, ParameterError, UnknownName
+from stickslip.cli import main
+from stickslip.errors import ConfigError, ModelRemark, ParameterError, UnknownName
 from stickslip.machines.files import library, machine
 from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.machine import IMPERFECTIONS
@@ -139,3 +142,19 @@ def test_names():
         machine("thesis-dri")
     with pytest.raises(ParameterError, match="as many of each"):
         Harmonics((1.0,), (), ())
+
+
+def test_a_band_of_velocities_at_rest_is_said_to_be_none_of_a_machines(tmp_path, capsys):
+    values = {"dv": 1e-3, "fs": 0.335, "fc": 0.285, "vs": 0.01}
+    with pytest.warns(ModelRemark, match=r"slower than 0\.001 rad/s .* rests at 0 rad/s alone"):
+        ss.Machine("own", 4e-4, ss.Contact(ss.Model("karnopp", **values)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ss.Machine("own", 4e-4, ss.Contact(ss.Model("stribeck_plain", fs=0.335, fc=0.285, vs=0.01)))
+    file = tmp_path / "banded.toml"
+    numbers = "".join(f"{name} = {value}\n" for name, value in values.items())
+    file.write_text(f'inertia = 4e-4\n[friction]\nlaw = "karnopp"\n{numbers}')
+    assert main(["machine", str(file)]) == 0
+    said = capsys.readouterr().err
+    assert said.startswith(f"stickslip: note: {file}: law 'karnopp' counts")
+    assert said.count("\n") == 1

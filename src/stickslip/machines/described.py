@@ -32,10 +32,14 @@ def default_of(kind: type[Any], field: str) -> Any:
 
 
 def described(kind: type[T]) -> type[T]:
-    """A dataclass whose docstring names its described numbers, after what the docstring says itself."""
-    own = inspect.cleandoc(kind.__doc__ or "")
-    lines = [_entry(kind, name, par) for name, par in numbers_of(kind).items()]
-    kind.__doc__ = own + ("\n" if HEAD in own else HEAD) + "\n".join(lines) + "\n"
+    """A dataclass whose docstring names its described numbers, behind the attributes that it names itself."""
+    before, _, rest = inspect.cleandoc(kind.__doc__ or "").partition(HEAD)
+    named, _, behind = rest.partition("\n\n")
+    lines = [
+        *([named] if named else []),
+        *(_entry(kind, name, par) for name, par in numbers_of(kind).items()),
+    ]
+    kind.__doc__ = before + HEAD + "\n".join(lines) + "\n" + (f"\n{behind}\n" if behind else "")
     return kind
 
 

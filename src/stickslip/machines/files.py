@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -13,7 +14,7 @@ from typing import Any, cast
 from stickslip import plugins
 from stickslip.arguments import arguments_checked
 from stickslip.config import Table, read_toml
-from stickslip.errors import UnknownName
+from stickslip.errors import ModelRemark, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.flexible import FlexibleAxis
@@ -84,12 +85,15 @@ def _read(path: Path) -> Machine:
         flexible, stiffness = _flexible(top)
         contact = _contact_of(top, friction)
         cogging = _part(top, "cogging")
-        return Machine(
+        made = Machine(
             path.stem, contact=contact, title=top.text("title", ""), flexible=flexible, flexible_stiffness=stiffness,
             amplifier=_amplifier_of(top), cogging=Harmonics(**cogging) if cogging else Harmonics(),
             encoder=Encoder(**_part(top, "encoder")), sensor=_sensor(top), limits=_limits(top), models=_models(top),
             notes=notes, **own,
         )  # fmt: skip
+    if made.remark:
+        warnings.warn(f"{top.label()}: {made.remark}", ModelRemark, stacklevel=2)
+    return made
 
 
 def _notes(top: Table) -> tuple[str, ...]:

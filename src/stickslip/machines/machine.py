@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,14 +17,14 @@ from typing import Annotated, Any, cast
 
 from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
 from stickslip.description import Par
-from stickslip.errors import ParameterError, UnknownName
+from stickslip.errors import ModelRemark, ParameterError, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.described import described
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
-from stickslip.model import Model
+from stickslip.model import Model, level_of_caller
 
 UNITY, NONE, EXACT, EXACTLY = Amplifier(1.0), Harmonics(), Encoder(), Converter()
 
@@ -78,6 +79,11 @@ class Machine:
         What the file says about its own numbers.
     switched_off : tuple of str
         Imperfections that `without` left out.
+
+    Warns
+    -----
+    ModelRemark
+        Where its friction law has a band of velocities at rest (Karnopp), which a machine has not (`remark`).
     """
 
     name: str
@@ -142,6 +148,20 @@ class Machine:
         if not math.isfinite(self.start_angle):
             raise ParameterError(f"machine: start_angle = {self.start_angle:g} rad must be a finite number")
         self._positive_up_to_its_speed()
+        if (words := self.remark) and (level := level_of_caller(4)):
+            warnings.warn(f"machine: {words}", ModelRemark, stacklevel=level)
+
+    @property
+    def remark(self) -> str:
+        """What is not as its friction law says, in a sentence; "" where there is nothing."""
+        law = self.friction.law
+        if law.rest_band is None:
+            return ""
+        return (
+            f"law {law.name!r} counts what is slower than {law.rest_band(self.friction.parameters):g} rad/s as at rest; "
+            "the contact of a machine rests at 0 rad/s alone: within that band it slides with the torque that the law "
+            "withstands; take 'stribeck_plain', which has no band, or an ideal axis, which has it"
+        )
 
     def _has_springs_to_stiffen(self) -> None:
         given = (
