@@ -157,10 +157,11 @@ class Machine:
         law = self.friction.law
         if law.rest_band is None:
             return ""
+        band = law.rest_band(self.friction.parameters)
         return (
-            f"law {law.name!r} counts what is slower than {law.rest_band(self.friction.parameters):g} rad/s as at rest; "
-            "the contact of a machine rests at 0 rad/s alone: within that band it slides with the torque that the law "
-            "withstands; take 'stribeck_plain', which has no band, or an ideal axis, which has it"
+            f"law {law.name!r} counts what is slower than {band:g} rad/s as at rest; the contact of a machine rests at "
+            "0 rad/s alone: within that band it slides with the torque that the law withstands; take 'stribeck_plain', "
+            "which has no band, or an ideal axis, which has it"
         )
 
     def _has_springs_to_stiffen(self) -> None:
