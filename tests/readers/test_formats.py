@@ -271,6 +271,12 @@ def test_a_column_of_words_is_left_out_and_told(tmp_path, delimiter, comma):
     ]
 
 
+def test_rows_with_more_empty_cells_than_numbers_are_a_table(tmp_path):
+    path = tmp_path / "sparse.csv"
+    path.write_text("time [s],position [rad],a,b,c\n" + "".join(f"{0.1 * i:.1f},{i},,,\n" for i in range(9)))
+    assert read(path)["position"][8] == 8.0
+
+
 def test_missing_cells_are_nan_and_words_are_told(tmp_path):
     record = read(table(tmp_path, "time,position\n0,1\n1,\n2,NaN\n3,oops\n4,5\n"))
     assert np.isnan(record["position"]).tolist() == [False, True, True, True, False]

@@ -128,14 +128,7 @@ def convert(
     listed: list[dict[str, Any]] = []
     for role, choice in by_role.items():
         if role == "time":
-            listed.append(
-                {
-                    "channel": "time",
-                    "column": choice.column,
-                    "unit": choice.unit or "s",
-                    "source": choice.source,
-                }
-            )
+            listed.append(_entry(choice, "s"))
             continue
         unit = unit_of(choice, linear)
         scale, target, steps = _scale(choice, unit, drive, linear)
@@ -143,23 +136,35 @@ def convert(
         said += resampled
         channels[role] = scale * values + (unit.offset if unit.offset else 0.0)
         units[role] = target
-        entry: dict[str, Any] = {
-            "channel": role,
-            "column": choice.column,
-            "unit": choice.unit or target,
-            "source": choice.source,
-        }
-        if role in ("motor_torque", "current") and commanded(choice.column):
-            entry["commanded"] = True
-        listed.append({**entry, "factor": scale, "side": choice.side or "motor", "steps": steps})
+        listed.append(
+            _entry(choice, target) | {"factor": scale, "side": choice.side or "motor", "steps": steps}
+        )
     said += _one_kind(channels, units, listed, drive)
     said += _idle_gear(listed, drive)
     derived, more = _torque_from_current(channels, units, drive, linear)
-    said += more
-    unused = [c for c in table.columns if c.name not in {e["column"] for e in listed}]
-    reading = {
+    reading = _reading(table, listed, drive, origin, [*said, *more])
+    return Record(time, channels, units, {"reading": reading, "derived": derived})
+
+
+def _entry(choice: Choice, unit: str) -> dict[str, Any]:
+    """What a record says of a column that it was made of; `unit` is the one that nobody stated."""
+    entry: dict[str, Any] = {
+        "channel": choice.role, "column": choice.column, "unit": choice.unit or unit, "source": choice.source,
+    }  # fmt: skip
+    if choice.role in ("motor_torque", "current") and commanded(choice.column):
+        entry["commanded"] = True
+    return entry
+
+
+def _reading(
+    table: Table, listed: Sequence[dict[str, Any]], drive: Drive, origin: float, said: Sequence[Finding]
+) -> dict[str, Any]:
+    """What a record says of how it was read."""
+    used = {entry["column"] for entry in listed}
+    unused = [c for c in table.columns if c.name not in used]
+    return {
         "format": table.format,
-        "columns": listed,
+        "columns": list(listed),
         "unused": [c.name for c in unused],
         "drives": [c.name for c in unused if _drives(c)],
         "constants": dict(table.constants),
@@ -167,7 +172,6 @@ def convert(
         "time_origin": origin,
         "findings": [f.as_data() for f in said],
     }
-    return Record(time, channels, units, {"reading": reading, "derived": derived})
 
 
 # ---- units --------------------------------------------------------------------------------------------------

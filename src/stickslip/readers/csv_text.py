@@ -137,9 +137,10 @@ def _sniff(path: Path, lines: Sequence[str]) -> Dialect:
             best, score = Dialect(delimiter, decimal, width, 0), merit
     if best is None:
         best = _sniff_among_words(filled, sample)
-    if best is None:
-        raise InputError(f"{path} holds no table of numbers; give a file with one row of numbers a sample")
-    if best.words:
+        if best is None:
+            raise InputError(
+                f"{path} holds no table of numbers; give a file with one row of numbers a sample"
+            )
         return best
     start = next(
         i for i, line in filled if len(c := best.split(line)) == best.width and _is_row(c, best.decimal)

@@ -20,6 +20,7 @@ from typing import Any
 
 from stickslip.capacity import insist_on_jobs, insist_on_memory
 from stickslip.errors import InputError
+from stickslip.identify.estimate import silent
 from stickslip.simulation.many import simd_batch
 from stickslip.study.files import claim_folder, save_manifest
 from stickslip.study.study import interrupts_between_runs
@@ -84,38 +85,48 @@ def run(
         If the folder or the scheduler cannot be used, there is no GPU and one is asked for, or workers are killed
         again and again.
     """
+    say = say or silent
+    progress = progress or _unseen
     if jobs:
         insist_on_jobs(jobs)
     ready(sweep, scheduler)
-    dataset.room_for(Path(out), sweep)
-    folder = claim_folder(Path(out), sweep.name, "sweep")
-    sweep = in_blocks(folder, sweep)
-    dataset.refuse_strays(folder, sweep)
+    folder, sweep = _prepared(Path(out), sweep)
     integrators = [integrator_of(sweep, i) for i in range(len(sweep.runs))]
-    if say:
-        for line in departures(sweep, integrators):
-            say(line)
-    dataset.clear_drafts(folder)
+    for line in departures(sweep, integrators):
+        say(line)
     clock, cpu = time.perf_counter(), time.process_time()
     missing = [b for b in sweep.blocks if not dataset.has_block(folder, sweep, *b)]
-    done, found = sweep.cases - sum(_size(sweep, b) for b in missing), len(sweep.blocks) - len(missing)
-    if say and found:
+    found = len(sweep.blocks) - len(missing)
+    if found:
         say(f"{found} of {len(sweep.blocks)} blocks were already done{'; going on' if missing else ''}")
-    if progress:
-        progress(done, sweep.cases)
+    done = sweep.cases - sum(_size(sweep, b) for b in missing)
+    progress(done, sweep.cases)
     with interrupts_between_runs() as check:
         goes_on = functools.partial(_passes, check)
         for block in computed(sweep, missing, jobs or os.cpu_count() or 1, backend, scheduler, goes_on):
             dataset.keep_block(folder, sweep, block)
             done += len(block.numbers)
-            if progress:
-                progress(done, sweep.cases)
+            progress(done, sweep.cases)
         check()
     timings = {
         "wall_s": time.perf_counter() - clock, "cpu_s": time.process_time() - cpu, "jobs": jobs,
         "blocks_computed": len(missing), "blocks_found": found,
     }  # fmt: skip
     return write_manifest(folder, sweep, timings, integrators)
+
+
+def _unseen(finished: int, total: int) -> None:
+    """The progress of a sweep that nobody watches."""
+
+
+def _prepared(out: Path, sweep: Sweep) -> tuple[Path, Sweep]:
+    """The folder, with room for the sweep and without another's blocks or halves of them, and the sweep in blocks."""
+    dataset.room_for(out, sweep)
+    folder = claim_folder(out, sweep.name, "sweep")
+    sweep = in_blocks(folder, sweep)
+    dataset.refuse_strays(folder, sweep)
+    dataset.clear_drafts(folder)
+    return folder, sweep
 
 
 BOOKED = 1000
