@@ -13,7 +13,7 @@ import tomli_w
 from stickslip.analyse.tracking import tracking_metrics
 from stickslip.commission import commission as commissioning
 from stickslip.commission.commission import commission, planned, tried
-from stickslip.commission.recommended import Following, write_recommended
+from stickslip.commission.recommended import Following, write_identified_machine, write_recommended
 from stickslip.commission.resume import claimed
 from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
@@ -27,7 +27,7 @@ from stickslip.identify.sliding.segments import constant_velocity_segments
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
-from stickslip.machines.files import machine
+from stickslip.machines.files import load_machine, machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
@@ -126,6 +126,12 @@ def test_a_machine_that_is_not_in_the_library(tmp_path):
     advised = done.recommended
     assert advised.advice.chosen.setting.kind == "feedforward"
     assert advised.tracked[0].ratio >= 3.0
+    mine = load_machine(
+        write_identified_machine(tmp_path / "machine.toml", advised, VirtualRig(OTHER), done.lugre)
+    )
+    known = advised.known.machine(VirtualRig(OTHER))
+    assert replace(mine, name=known.name, title="", models={}) == known
+    assert {"gms", "coulomb"} <= set(mine.models)
     # What the file recommends, run as the command line does, is what was measured.
     file = write_recommended(tmp_path / "recommended.toml", advised)
     again = Track(compensator="recommended", model=str(file))

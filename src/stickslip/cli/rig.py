@@ -50,7 +50,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     run_one.add_argument("--realtime", action="store_true", help="run a virtual rig in real time")
     run_one.add_argument("--stream", type=Path, metavar="FILE", help="also stream every sample to this file")
     _files.force_argument(run_one)
-    whole = actions.add_parser("commission", help="run all procedures; writes model.toml and a report")
+    whole = actions.add_parser(
+        "commission", help="run all procedures; writes model.toml, machine.toml and a report"
+    )
     whole.add_argument(
         "--out",
         type=Path,
@@ -245,6 +247,8 @@ def commissioned(args: argparse.Namespace) -> int:
     print()
     for note in found.result.notes:
         print(f"- {note}")
+    if found.recommended:
+        print(f"machine: {folder / 'machine.toml'}")
     print(f"model: {model}\nreport: {report}\nrecords: {folder}")
     return 0
 
@@ -264,8 +268,9 @@ def print_plan(rig: Rig, cogging: Literal["", "rotation", "standstill"]) -> int:
 def write_commissioned(
     found: Commissioned, rig: Rig, folder: Path, lines: Sequence[tuple[str, str]]
 ) -> tuple[Path, Path]:
-    """Write model.toml, recommended.toml where there is one, and the report; returns the model and the report."""
-    from stickslip.commission.recommended import write_recommended
+    """Write model.toml, machine.toml and recommended.toml where there is one, and the report; returns the model and the
+    report."""
+    from stickslip.commission.recommended import write_identified_machine, write_recommended
     from stickslip.identify.model_file import versions, write_model
     from stickslip.report.identified import Source, write_identification
 
@@ -273,6 +278,8 @@ def write_commissioned(
     records = {s.name: s.performed.record for s in stages}
     data = [described(folder / f"{name}.npz", len(record)) for name, record in records.items()]
     model = write_model(folder / "model.toml", found.result, data=data)
+    if found.recommended:
+        write_identified_machine(folder / "machine.toml", found.recommended, rig, found.lugre)
     if found.recommended and found.recommended.advice.chosen:
         write_recommended(folder / "recommended.toml", found.recommended)
     sources = [Source(s.name, s.performed.record, findings_of(s.performed)) for s in stages]

@@ -181,6 +181,18 @@ def write_recommended(path: Path, found: TrackedRecommendation) -> Path:
     return write_model(path, result, more={"recommended": recommended_table(found.advice, found.machine)})
 
 
+def write_identified_machine(path: Path, found: TrackedRecommendation, rig: Rig, lugre: Model | None) -> Path:
+    """The machine as it was identified on the rig, for simulations: what `stickslip.load_machine` reads.
+
+    The laws to try on it are its models; the torque over the angle beside friction is not in it (`Known.machine`).
+    """
+    laws = laws_to_try(found.known.model, lugre)
+    machine = dataclasses.replace(
+        found.known.machine(rig), title=f"{rig.name} as it was commissioned", models=laws
+    )
+    return machine.write(path)
+
+
 # ---- on the machine ---------------------------------------------------------------------------------------------
 
 

@@ -14,7 +14,7 @@ from stickslip.record import Record
 from stickslip.rigs.procedures.base import Check, Performed, Procedure
 from stickslip.rigs.rig import Rig
 
-RESULTS = ("model.toml", "recommended.toml", "report.html")
+RESULTS = ("model.toml", "machine.toml", "recommended.toml", "report.html")
 """What a commissioning writes at its end."""
 
 
