@@ -76,7 +76,7 @@ class FlexibleAxis:
         return torque / self.coupling, torque / self.elasticity
 
     def visible(self, stiffness: float) -> float:
-        """Stiffness of a contact at the disk (N·m/rad) as the encoder sees it: in series with the shaft."""
+        """`stiffness` of a contact at the disk (N·m/rad) as the encoder sees it: in series with the shaft."""
         return 1.0 / (1.0 / stiffness + 1.0 / self.elasticity)
 
     def behind(self, visible: float) -> float:

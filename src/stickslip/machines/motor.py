@@ -119,5 +119,5 @@ class Harmonics:
         return max(values) - min(values)
 
     def scaled(self, factor: float) -> Harmonics:
-        """All amplitudes multiplied."""
+        """All amplitudes multiplied by `factor`."""
         return Harmonics(self.order, tuple(factor * a for a in self.amplitude), self.phase)
