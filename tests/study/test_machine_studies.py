@@ -110,7 +110,9 @@ def test_a_single_run_takes_a_machine(run: Path, capsys: pytest.CaptureFixture[s
     record = ss.Record.load(run.parent / "run.npz")
     assert record.meta["machine"]["without"] == ["cogging"]
     assert np.ptp(record["position_measured"] - record["position"]) > 0.0
-    assert "position_rms" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "position_rms" in said
+    assert f"within about {record.meta['accuracy']['error_rad']:.1g} rad, by a run at a thousandth" in said
 
 
 @pytest.mark.parametrize(

@@ -135,7 +135,9 @@ def print_accuracy(meta: Mapping[str, Any]) -> None:
     if "error_rad" not in found:
         return
     if "machine" in meta:
-        print(f"accuracy: halving the sub-steps changes the position by up to {found['error_rad']:.1g} rad")
+        print(
+            f"accuracy: position within about {found['error_rad']:.1g} rad, by a run at a thousandth of the tolerance"
+        )
         return
     tolerance, error = meta["tolerance"], found["error_rad"]
     if error <= 10.0 * tolerance:
