@@ -11,7 +11,7 @@ import pytest
 
 from stickslip.identify.axis.agreed import told_apart
 from stickslip.identify.axis.identify import identify_axis
-from stickslip.identify.axis.in_sentences import on_bend
+from stickslip.identify.axis.in_sentences import on_bend, on_swing
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.smooth import Window, seen
@@ -74,6 +74,8 @@ def test_a_load_that_swings_behind_a_belt_does_not_count_as_more_inertia(frequen
     assert low < MOTOR + LOAD < high
     assert found.numbers["inertia"].value == pytest.approx(MOTOR + LOAD, rel=0.02)
     assert found.numbers["fc"].value == pytest.approx(0.2, rel=0.03)
+    (said,) = on_swing(found)
+    assert float(said.split(" Hz")[0].split()[-1]) == pytest.approx(frequency, rel=0.1)
 
 
 def test_a_filter_in_the_column_of_the_torque_does_not_count_as_less_inertia() -> None:
@@ -88,6 +90,8 @@ def test_a_filter_in_the_column_of_the_torque_does_not_count_as_less_inertia() -
     low, high = found.interval("inertia")
     assert low < MOTOR + LOAD < high
     assert found.numbers["inertia"].value == pytest.approx(MOTOR + LOAD, rel=0.01)
+    (said,) = on_swing(found)
+    assert float(said.split(" ms")[0].split()[-1]) == pytest.approx(8.0, rel=0.15)
 
 
 def bend(found: Regression) -> float:
@@ -135,7 +139,7 @@ def test_a_level_that_friction_of_another_form_alone_puts_in_doubt_says_so() -> 
 def test_friction_with_a_level_and_a_slope_does_not_bend() -> None:
     found = regress_axis([rigid(coulomb)], AXIS)
     assert bend(found) == 0.0
-    assert on_bend(found) == []
+    assert on_bend(found) == on_swing(found) == []
 
 
 def test_a_bend_is_what_two_bands_show() -> None:

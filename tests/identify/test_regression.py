@@ -140,7 +140,7 @@ def test_what_the_prediction_error_alone_says_is_not_identified_where_it_contrad
     good, bad = said(log.truth["fc"]), said(1.5 * log.truth["fc"])
     assert good["fs"].identified
     assert not bad["fs"].identified
-    assert "contradicts certain sliding on fc" in bad["fs"].verdict
+    assert "contradicts gross sliding on fc" in bad["fs"].verdict
     assert bad["fc"].value == pytest.approx(log.truth["fc"], rel=0.02)
 
 

@@ -50,13 +50,13 @@ stand."""
 CONTRADICTS = 0.2
 """Part of the larger of two methods' numbers, by which they may differ where one is identified: the other is what four
 lines of least squares give."""
-DOUBT = "the prediction error, the only evidence for it, contradicts certain sliding on {name}: {other} against {own}"
+DOUBT = "the prediction error, the only evidence for it, contradicts gross sliding on {name}: {other} against {own}"
 ONE_BAND = (
-    "two methods are apart: the prediction error says {other.value:.4g}, certain sliding, of which one band of "
-    "frequencies alone tells it, {own.value:.4g} {own.unit}"
+    "two methods are apart: the prediction error says {other.value:.4g}, gross sliding, of which one band of "
+    "frequencies alone shows it, {own.value:.4g} {own.unit}"
 )
 BAND_ALONE = (
-    "one band of frequencies alone tells it, where level and slope, or motor and load, are not told apart"
+    "one band of frequencies alone shows it, where level and slope, or motor and load, are not distinguished"
 )
 OTHER_FORM = "slower steady motion has another friction than this level and slope"
 BENT = (
@@ -86,7 +86,7 @@ def regressed(
     try:
         return regress(experiments, axis, skew=skew, harmonic_period=harmonic_period, **ways), []
     except InputError as error:
-        return None, [f"No regression on certain sliding: {error}."]
+        return None, [f"No regression on gross sliding: {error}."]
 
 
 def aligned(experiments: Sequence[Experiment], found: Regression | None) -> list[Experiment]:
@@ -158,7 +158,7 @@ def agreed(
             e.name: told(e, parameters[e.name], *sliding[e.name], scale.get(e.name, math.nan))
             for e in estimates if taken.get(e.name) is e
         }  # fmt: skip
-        notes.append(f"Inertia, offset and friction's level are those of certain sliding: {doubts}.")
+        notes.append(f"Inertia, offset and friction's level are those of gross sliding: {doubts}.")
     for e in estimates if fine and told_with(vector.base, found) else ():
         if e.name.removesuffix(NEGATIVE) not in FALL or e.name not in parameters:
             continue
@@ -354,6 +354,6 @@ def held_together(
             wide, identified=False, verdict=f"the plain inverse dynamics says {value:.4g} {e.unit} instead"
         )
     return wide, [
-        f"{e.name}: the plain inverse dynamics, reversals included, says {value:.4g}, certain sliding {e.value:.4g} "
+        f"{e.name}: the plain inverse dynamics, reversals included, says {value:.4g}, gross sliding {e.value:.4g} "
         f"{e.unit}; the interval holds both."
     ]

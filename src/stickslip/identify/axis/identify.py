@@ -30,7 +30,7 @@ from stickslip.identify.axis.choice import (
 from stickslip.identify.axis.drifting import at_the_middle, on_drift
 from stickslip.identify.axis.exponent import is_open, shown
 from stickslip.identify.axis.form import TOLD_BY_SLIDING
-from stickslip.identify.axis.in_sentences import on_bend, on_creep, on_timing, on_width
+from stickslip.identify.axis.in_sentences import on_bend, on_creep, on_swing, on_timing, on_width
 from stickslip.identify.axis.law_fit import Evidence, against_sliding, estimated
 from stickslip.identify.axis.output import judged
 from stickslip.identify.axis.result import assembled, narrow_note, noted
@@ -260,6 +260,7 @@ def looked_at(
     said = [
         *(on_timing(sliding) if skew is None else []),
         *on_width(sliding),
+        *on_swing(sliding),
         *on_creep(sliding, axis),
         *on_bend(sliding),
         *on_drift(sliding),

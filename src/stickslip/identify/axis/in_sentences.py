@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import statistics
+
 from stickslip.identify.axis.agreed import ALIGNED, KNOWN
 from stickslip.identify.regression.bent import bend_told
 from stickslip.identify.regression.regression import Regression
@@ -38,6 +41,25 @@ def on_width(found: Regression | None) -> list[str]:
     return [
         f"Faster than {found.bands[0].corner:.2g} Hz the axis does not move as one inertia (play that opens while it "
         f"slides, a train that rings): inertia and friction are those of slower motion."
+    ]
+
+
+def on_swing(found: Regression | None) -> list[str]:
+    """That a load swings behind a spring, or that the torque's column is filtered, in a sentence; nothing where neither
+    shows."""
+    swings = [] if found is None else [b.swing for b in found.bands if b.swing]
+    if not swings:
+        return []
+    swing = statistics.median(swings)
+    if swing < 0.0:
+        frequency = 1.0 / (2.0 * math.pi * math.sqrt(-swing))
+        return [
+            f"Motor and load do not move as one: with the motor held the load swings at about {frequency:.2g} Hz; this "
+            "is allowed for, and the inertia is that of both."
+        ]
+    return [
+        f"The torque column lags as behind a filter of about {1e3 * math.sqrt(2.0 * swing):.2g} ms; this is allowed "
+        "for."
     ]
 
 
