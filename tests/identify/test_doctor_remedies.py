@@ -101,6 +101,20 @@ def test_a_velocity_without_a_position_is_said(tmp_path):
     assert "--map position=COLUMN:rad" in said.remedy
 
 
+def test_an_axis_is_identified_from_velocity_and_torque_alone(tmp_path):
+    """Traces of drives often hold no more."""
+    x = log()
+    rpm = np.round(30.0 / np.pi * x["v"], 1)
+    path = written(tmp_path / "log.csv", **{"t [s]": x["t"], "n [rpm]": rpm, "M [Nm]": x["tau"]})
+    found = ss.identify(path, law="coulomb")
+    assert found["inertia"].value == pytest.approx(J, rel=0.01)
+    assert found["fc"].value == pytest.approx(FC, rel=0.01)
+    assert found["fc"].identified
+    assert any(f.code == "missing-column" for f in found.sources[0].findings)
+    with pytest.raises(InputError, match="at which angle a pendulum hangs"):
+        ss.identify(path, law="coulomb", pendulum=True)
+
+
 def test_a_refusal_names_the_call_that_says_more(tmp_path):
     x = log()
     with pytest.raises(InputError, match=r'torque-sign"\] if you know.*see `ss\.doctor\(\.\.\.\)`$'):

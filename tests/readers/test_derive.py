@@ -8,7 +8,7 @@ import pytest
 from stickslip import Record
 from stickslip.errors import InputError
 from stickslip.readers import Drive, read
-from stickslip.readers.derive import METHODS, with_resampled_time, with_velocity
+from stickslip.readers.derive import METHODS, with_position, with_resampled_time, with_velocity
 
 T = np.arange(0.0, 2.0, 1e-3)
 
@@ -102,3 +102,18 @@ def test_both_sides_of_a_gear(tmp_path):
     assert "--side load" in said["remedy"]
     for moved in (motor, load):
         assert "gear-ratio" not in {f["code"] for f in moved.meta["reading"]["findings"]}
+
+
+def test_a_position_is_the_integral_of_the_velocity():
+    time = np.cumsum(np.random.default_rng(1).uniform(0.5e-3, 1.5e-3, 2000))
+    moving = Record(time, {"velocity": 3.0 * np.cos(2.0 * time)}, {"velocity": "rad/s"})
+    found = with_position(moving)
+    exact = 1.5 * (np.sin(2.0 * time) - np.sin(2.0 * time[0]))
+    np.testing.assert_allclose(found["position"], exact, atol=1e-5)
+    assert found.units["position"] == "rad"
+    assert "integral" in found.meta["derived"]["position"]
+    moving.channels["velocity"][3] = np.nan
+    with pytest.raises(InputError, match="missing values"):
+        with_position(moving)
+    with pytest.raises(InputError, match="neither a position nor a velocity"):
+        with_position(Record(time, {"torque": time}, {"torque": "N·m"}))

@@ -11,6 +11,7 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.record import Record
 
 METHODS = ("butterworth", "savitzky-golay")
+INTEGRAL = "integral of the velocity, from 0, by trapezoids"
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -72,6 +73,34 @@ def with_velocity(record: Record, method: str = "butterworth", *, cutoff: float 
     return _with(
         record, {"velocity": velocity}, {"velocity": f"{record.units['position']}/s"}, {"velocity": how}
     )
+
+
+def with_position(record: Record) -> Record:
+    """The record with the position as integral of its velocity, from 0, by trapezoids.
+
+    Returns
+    -------
+    Record
+        Channel ``position`` in rad (or m) replaced or added; what friction does within a count of an encoder, and where
+        on a turn the axis stands, no integral shows.
+
+    Raises
+    ------
+    InputError
+        Without velocity, or with gaps in it.
+    """
+    if "velocity" not in record.channels:
+        raise InputError("the record has neither a position nor a velocity to integrate; map one of them")
+    velocity = record["velocity"]
+    if not np.isfinite(velocity).all():
+        raise InputError(
+            "the record has no position, and its velocity has missing values, over which it cannot be integrated; leave "
+            "those rows out (--leave-out A:B), or map the position"
+        )
+    ways = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(record.time)
+    position: Array = np.concatenate([[0.0], np.cumsum(ways)])
+    unit = record.units["velocity"].removesuffix("/s")
+    return _with(record, {"position": position}, {"position": unit}, {"position": INTEGRAL})
 
 
 def with_resampled_time(record: Record, period: float | None = None) -> Record:
