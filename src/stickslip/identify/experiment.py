@@ -241,8 +241,8 @@ def experiment_of(
         raise InputError("the record has no channel 'position'; map one to it")
     if axis.gravity == "pendulum" and "position" in record.meta.get("derived", {}):
         raise InputError(
-            "the record has no channel 'position', and a velocity does not say at which angle a pendulum hangs; map the "
-            "position (--map position=COLUMN:UNIT)"
+            "the record has no channel 'position', and a velocity does not say at which angle a pendulum hangs; map "
+            "the position (--map position=COLUMN:UNIT)"
         )
     found = next((c for c in DRIVES if c in record.channels), None)
     reference = next((c for c in REFERENCES if c in record.channels), None)

@@ -94,8 +94,8 @@ def with_position(record: Record) -> Record:
     velocity = record["velocity"]
     if not np.isfinite(velocity).all():
         raise InputError(
-            "the record has no position, and its velocity has missing values, over which it cannot be integrated; leave "
-            "those rows out (--leave-out A:B), or map the position"
+            "the record has no position, and its velocity has missing values, over which it cannot be integrated; "
+            "leave those rows out (--leave-out A:B), or map the position"
         )
     ways = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(record.time)
     position: Array = np.concatenate([[0.0], np.cumsum(ways)])

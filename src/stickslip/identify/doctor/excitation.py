@@ -25,8 +25,8 @@ def channels(view: View) -> Iterator[Finding]:
         yield Finding(
             "warning",
             "missing-column",
-            "there is a velocity but no position: `identify` integrates it, from 0, so that neither the first hundredths "
-            "of a degree after a reversal nor anything that depends on the position shows",
+            "there is a velocity but no position: `identify` integrates it, from 0, so that neither the first "
+            "hundredths of a degree after a reversal nor anything that depends on the position shows",
             remedy="log the position as well, and say which column it is, such as --map position=COLUMN:rad",
         )
     if not view.torque_channel:
