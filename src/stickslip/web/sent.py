@@ -151,19 +151,14 @@ def main_of(files: Mapping[str, str]) -> tuple[str, str]:
                 raise Refused(
                     400, f"{name} names {value[:80]!r}, outside what was sent; put that file beside it"
                 )
-    machine = is_machine(tables[main])
+    # A machine makes a virtual rig.
+    machine = kind == "machine"
     if kind not in KEPT_AS and not machine:
         what = WORDS[kind][0] if kind else "of a kind that is not known"
-        raise Refused(400, f"{main} is {what}; the page takes models, studies, simulations and rigs")
+        raise Refused(400, f"{main} is {what}; the page takes models, studies, simulations, rigs and machines")
     if kind == "rig" or machine:
         complete(tables, files)
-    return main, "machine" if machine else KEPT_AS[kind]
-
-
-def is_machine(table: Mapping[str, Any]) -> bool:
-    """Whether a file describes a machine, which makes a virtual rig."""
-    friction = table.get("friction")
-    return not kind_of_toml(table) and "inertia" in table and isinstance(friction, dict) and "law" in friction
+    return main, kind if machine else KEPT_AS[kind]
 
 
 def with_rig(machine: str, files: dict[str, str]) -> dict[str, str]:
