@@ -155,7 +155,9 @@ def main_of(files: Mapping[str, str]) -> tuple[str, str]:
     machine = kind == "machine"
     if kind not in KEPT_AS and not machine:
         what = WORDS[kind][0] if kind else "of a kind that is not known"
-        raise Refused(400, f"{main} is {what}; the page takes models, studies, simulations, rigs and machines")
+        raise Refused(
+            400, f"{main} is {what}; the page takes models, studies, simulations, rigs and machines"
+        )
     if kind == "rig" or machine:
         complete(tables, files)
     return main, kind if machine else KEPT_AS[kind]
