@@ -15,9 +15,9 @@ from stickslip.identify.axis.in_sentences import on_bend, on_swing
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.smooth import Window, seen
-from stickslip.identify.regression.bent import bend_told
 from stickslip.identify.regression.flexible import swings_alike
-from stickslip.identify.regression.regression import Regression, regress_axis
+from stickslip.identify.regression.regression import regress_axis
+from stickslip.identify.regression.together import bend_of
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 
@@ -94,11 +94,6 @@ def test_a_filter_in_the_column_of_the_torque_does_not_count_as_less_inertia() -
     assert float(said.split(" ms")[0].split()[-1]) == pytest.approx(8.0, rel=0.15)
 
 
-def bend(found: Regression) -> float:
-    """What the bands say together."""
-    return bend_told({b.corner: b.bend for b in found.bands})
-
-
 @pytest.mark.parametrize(
     ("friction", "sign", "said"),
     [
@@ -112,7 +107,7 @@ def test_friction_that_rises_in_another_form_identifies_no_level_and_slope(
     """A lubricant that thins, and drag with the square of the speed: level 71 % too high, slope 267 %, identified."""
     log = rigid(friction)
     found = regress_axis([log], AXIS)
-    assert sign * bend(found) > 0.0
+    assert sign * bend_of(found.bands) > 0.0
     (sentence,) = on_bend(found)
     assert said in sentence
     low, high = found.interval("inertia")
@@ -138,16 +133,19 @@ def test_a_level_that_friction_of_another_form_alone_puts_in_doubt_says_so() -> 
 
 def test_friction_with_a_level_and_a_slope_does_not_bend() -> None:
     found = regress_axis([rigid(coulomb)], AXIS)
-    assert bend(found) == 0.0
+    assert bend_of(found.bands) == 0.0
     assert on_bend(found) == on_swing(found) == []
 
 
 def test_a_bend_is_what_two_bands_show() -> None:
-    assert bend_told({60.0: 0.2, 37.0: 0.1}) == 0.2
-    assert bend_told({60.0: 0.2, 37.0: 0.01}) == 0.0
-    assert bend_told({60.0: 0.2, 37.0: -0.1}) == 0.0
-    assert bend_told({60.0: -0.04, 37.0: -0.04}) == 0.0
-    assert bend_told({}) == 0.0
+    first, second, *_ = regress_axis([rigid(coulomb)], AXIS).bands
+
+    def told(a: float, b: float) -> float:
+        return bend_of([replace(first, bend=a), replace(second, bend=b)])
+
+    assert told(0.2, 0.1) == 0.2
+    assert told(0.2, 0.01) == told(0.2, -0.1) == told(-0.04, -0.04) == 0.0
+    assert bend_of([replace(first, bend=0.2), replace(first, bend=0.2)]) == bend_of([]) == 0.0
 
 
 def test_a_swing_is_about_the_same_in_two_bands() -> None:

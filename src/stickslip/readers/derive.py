@@ -103,6 +103,13 @@ def with_position(record: Record) -> Record:
     return _with(record, {"position": position}, {"position": unit}, {"position": INTEGRAL})
 
 
+def positioned(record: Record) -> Record:
+    """The record of an axis, its position the integral of the velocity where it has none; of a
+    tribometer's friction torque none is needed."""
+    lacks = "velocity" in record.channels and not {"position", "friction_torque"} & record.channels.keys()
+    return with_position(record) if lacks else record
+
+
 def with_resampled_time(record: Record, period: float | None = None) -> Record:
     """The record interpolated linearly on an even grid.
 

@@ -25,7 +25,7 @@ from stickslip.identify.regression.regressions import Regress, Regressions
 from stickslip.model import Model
 from stickslip.readers.convert import pendulum_before_gear
 from stickslip.readers.cut import file_rows, pieces
-from stickslip.readers.derive import with_position
+from stickslip.readers.derive import positioned
 from stickslip.record import Record, row_period
 from stickslip.report.identified import Source
 from stickslip.spec import Law
@@ -284,12 +284,6 @@ def sources_of(
             for n, d in zip(names, every, strict=True)
         ]
     return out
-
-
-def positioned(record: Record) -> Record:
-    """The record of an axis, its position the integral of the velocity where it has none: the doctor has said so."""
-    lacks = "velocity" in record.channels and not {"position", "friction_torque"} & record.channels.keys()
-    return with_position(record) if lacks else record
 
 
 def _listed(logs: Log | Sequence[Log]) -> list[Log]:

@@ -32,11 +32,11 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.uncertainty import RATIO
-from stickslip.identify.regression.bent import bend_told
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import QUANTILE, Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
 from stickslip.identify.regression.strokes import stacked
+from stickslip.identify.regression.together import bend_of
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 
@@ -242,7 +242,7 @@ def told_apart(estimates: Iterable[Estimate], found: Regression, model: Model) -
     """
     of_law = told_with(model, found)
     (low, high), own = found.interval("fc"), found.numbers["fc"].value
-    bend = bend_told({b.corner: b.bend for b in found.bands})
+    bend = bend_of(found.bands)
     # What sliding hardly tells is the prediction error's.
     clear = {
         "inertia": True, "fc": of_law and high <= RATIO * low, "sigma2": of_law and found.slope_told,

@@ -6,8 +6,8 @@ import math
 import statistics
 
 from stickslip.identify.axis.agreed import ALIGNED, KNOWN
-from stickslip.identify.regression.bent import bend_told
 from stickslip.identify.regression.regression import Regression
+from stickslip.identify.regression.together import bend_of
 from stickslip.machines.servo import ServoAxis
 
 
@@ -82,7 +82,7 @@ def on_creep(found: Regression | None, axis: ServoAxis) -> list[str]:
 def on_bend(found: Regression | None) -> list[str]:
     """That friction rises with velocity in another form than a level and a slope, in a sentence; nothing where it does
     not."""
-    bend = 0.0 if found is None else bend_told({b.corner: b.bend for b in found.bands})
+    bend = 0.0 if found is None else bend_of(found.bands)
     if bend == 0.0:
         return []
     how, why = (

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -134,11 +134,42 @@ def fit_band(
         What moves.
     """
     system = System(records, tried, orders, background, pendulum, skew_size, each_way, drifting, train)
-    at = start if skew is None else skew
-    system.expected = at
+    waves = (len(orders), len(background)) if blurred and orders else None
+    system.expected = start if skew is None else skew
+    at, torque, candidates, weight = settled(system, skew is not None, waves)
+    named = combinations(system.core, pendulum, each_way)
+    if drifting:
+        named |= drift_rows(records, system.core, CORE + 2 * pendulum + each_way)
+    out = summed_up(system, torque, candidates, weight, at, tried, len(orders), named)
+    if waves is None:
+        return out
+    most_likely = candidates[int(np.argmax(weight))]
+    return replace(out, numbers=out.numbers | {"inertia": beside_waves(out, system, torque, most_likely)})
+
+
+class Settled(NamedTuple):
+    """The skew at which the jerk explains nothing more, s, the torque that acted, the candidates and their weights."""
+
+    skew: float
+    torque: Array
+    candidates: list[Candidate]
+    weight: Array
+
+
+def settled(system: System, known: bool, waves: tuple[int, int] | None) -> Settled:
+    """The search for the skew from where it is expected, for noise and its memory: by turns until nothing moves.
+
+    Parameters
+    ----------
+    system : System
+    known : bool
+        Whether the skew is, so that it stays.
+    waves : tuple of int, optional
+        Orders and background of a torque over the position whose orders the way is too short to distinguish.
+    """
+    size, at = system.skew_size, system.expected
     torque = system.torque(at)
-    candidates = system.candidates(torque, at)
-    weight = np.zeros(0)
+    candidates, weight = system.candidates(torque, at), np.zeros(0)
     for turn in range(ROUNDS):
         best = min(candidates, key=lambda c: c.cost)
         residual = system.residual(torque, best)
@@ -146,30 +177,20 @@ def fit_band(
         system.noise = float(residual @ residual) / freedom + (FORM * system.fc) ** 2
         system.memory = max(memory_of(residual, system.stroke), MEMORY)
         weight = system.weights(candidates)
-        if blurred and orders:
-            system.beside(best, len(orders), len(background))
+        if waves is not None:
+            system.beside(best, *waves)
         inertia, jerk = (
             sum(w * c.values[i] for w, c in zip(weight, candidates, strict=True)) / system.scale[i]
             for i in (INERTIA, JERK)
         )
-        step = (
-            float(np.clip(-jerk / inertia, -STRIDE * skew_size, STRIDE * skew_size)) if inertia > 0.0 else 0.0
-        )
-        if skew is not None or turn == ROUNDS - 1 or (turn > 1 and abs(step) < SETTLED):
+        step = float(np.clip(-jerk / inertia, -STRIDE * size, STRIDE * size)) if inertia > 0.0 else 0.0
+        if known or turn == ROUNDS - 1 or (turn > 1 and abs(step) < SETTLED):
             break
-        at = float(
-            np.clip(at + step, system.expected - FARTHEST * skew_size, system.expected + FARTHEST * skew_size)
-        )
+        farthest = FARTHEST * size
+        at = float(np.clip(at + step, system.expected - farthest, system.expected + farthest))
         torque = system.torque(at)
         candidates = system.candidates(torque, at)
-    named = combinations(system.core, pendulum, each_way)
-    if drifting:
-        named |= drift_rows(records, system.core, CORE + 2 * pendulum + each_way)
-    out = summed_up(system, torque, candidates, weight, at, tried, len(orders), named)
-    if not (blurred and orders):
-        return out
-    most_likely = candidates[int(np.argmax(weight))]
-    return replace(out, numbers=out.numbers | {"inertia": beside_waves(out, system, torque, most_likely)})
+    return Settled(at, torque, candidates, weight)
 
 
 def beside_waves(found: BandFit, system: System, torque: Array, candidate: Candidate) -> Number:

@@ -7,7 +7,7 @@ as a fall would fall, exp(-|v/vs|^d) with a negative size, explains what no fall
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 CLEAR = 30.0
 """Logarithm of the likelihood by which the rise must explain the record better. Of 640 logs of other programs, 27 with
-another form among them, 21 of these are found by this, `SHOWN` and `AGAIN`; of the others three, two of which tell a
+another form among them, 21 of these are found where two bands show it; of the others three, two of which tell a
 wrong level."""
-SHOWN, AGAIN = 0.05, 0.03
-"""Part of Fc by which friction's curve must then be another one over the recorded speeds, in some band; in a second."""
 LESS, LEFT = 0.6, 0.05
 """Part of the misfit, and of Fc, that is left at most where friction's form explains the record."""
 MOST = 0.95
@@ -72,10 +70,3 @@ def friction_of(system: System, c: Candidate) -> Array:
     own = np.flatnonzero(np.isin(c.columns, (VISCOUS, COULOMB)) | (c.columns >= system.core))
     torque = system.columns[:, c.columns[own]] @ c.values[own]
     return np.asarray(torque * stacked(system.records, "fixed")[:, DIRECTION], dtype=np.float64)
-
-
-def bend_told(bends: Mapping[float, float]) -> float:
-    """The bend that one band of frequencies shows and a second confirms, of those by the bands' corners; else 0."""
-    most = max(bends.values(), key=abs, default=0.0)
-    again = [b for b in bends.values() if b * most > 0.0 and abs(b) > AGAIN]
-    return most if abs(most) > SHOWN and len(again) > 1 else 0.0

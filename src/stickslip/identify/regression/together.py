@@ -20,6 +20,8 @@ SWUNG = 0.1
 FORM = 0.012
 """Part of Fc, one standard deviation, that its level is unsure by where the slope beside it is not told: of 103 levels
 on tuning steps 89 % held without it."""
+BENT, AGAIN = 0.05, 0.03
+"""Part of Fc by which friction's curve must be another one over the recorded speeds, in some band; in a second."""
 ROTATED = {"gravity_sin", "gravity_cos"}
 
 
@@ -75,3 +77,13 @@ def with_form(level: Number, slope: Number) -> Number:
     if slope.told_to_two:
         return level
     return Number(level.value, math.hypot(level.std, FORM * level.value))
+
+
+def bend_of(bands: Sequence[BandFit]) -> float:
+    """Part of Fc by which friction bends with velocity in another way than any level, slope and fall: what one band
+    shows and one of another width confirms; above 0 where friction rises ever faster, below 0 ever more slowly, else 0.
+    """
+    bends = {b.corner: b.bend for b in bands}
+    most = max(bends.values(), key=abs, default=0.0)
+    again = [b for b in bends.values() if b * most > 0.0 and abs(b) > AGAIN]
+    return most if abs(most) > BENT and len(again) > 1 else 0.0
