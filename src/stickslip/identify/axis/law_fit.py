@@ -121,7 +121,7 @@ def by_sliding(
     u = vector.coordinates(vector.named(vector.start) | {e.name: e.value for e in estimates})
     estimates = evident(estimates, vector, u, experiments, axis)
     estimates, more = beside_plain(estimates, model, vector, inverse, sliding)
-    estimates = told_apart(estimates, sliding, model)
+    estimates = told_apart(estimates, sliding, model, inverse)
     u = vector.coordinates(vector.named(u) | {e.name: e.value for e in estimates})
     found = with_values(experiments, axis, law, vector, u, asked.extras)
     shown = [replace(e, unit=axis.unit(e.unit)) for e in estimates]
@@ -265,5 +265,5 @@ def checked(result: PredictionError | Fitted, evidence: Evidence) -> tuple[tuple
     if inverse is not None:
         estimates, more = beside_plain(estimates, result.model, result.vector, inverse, sliding)
         said = [*said, *more]
-    estimates = told_apart(estimates, sliding, result.model)
+    estimates = told_apart(estimates, sliding, result.model, inverse)
     return (estimates if known_to_act(sliding) else with_level(estimates)), said

@@ -28,7 +28,7 @@ from stickslip.identify.regression.band_system import (
 )
 from stickslip.identify.regression.bent import bent_in, explains
 from stickslip.identify.regression.drifting import drift_rows
-from stickslip.identify.regression.flexible import Train
+from stickslip.identify.regression.flexible import Train, flexible_columns
 from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import memory_of
@@ -83,6 +83,8 @@ class BandFit:
         Coefficient of the torque's second derivative where a load swings, s²; else 0.
     bend : float
         Part of Fc by which friction rises with velocity in another form (`stickslip.identify.regression.bent`).
+    flexible : float
+        Part of the misfit that a train which gives or swings would leave at least; 1 where it does already.
     """
 
     corner: float
@@ -98,6 +100,7 @@ class BandFit:
     pieces: int
     swing: float
     bend: float
+    flexible: float
 
 
 def fit_band(
@@ -308,5 +311,13 @@ def summed_up(
         system.records[0].window.corner, numbers, float(falls / total), weight,
         tuple(tried[k] for k in system.levels), harmonics, correlation, misfit,
         misfit / max(float(np.sqrt(np.mean(torque**2))), 1e-300), torque.size, int(system.piece[-1]) + 1,
-        system.swing_of(best), bend,
+        system.swing_of(best), bend, left_flexible(system, torque, best),
     )  # fmt: skip
+
+
+def left_flexible(system: System, torque: Array, best: Candidate) -> float:
+    """Part of a rigid axis's misfit that a train which gives or swings would leave at least."""
+    if system.train is not Train.RIGID:
+        return 1.0
+    columns, _ = flexible_columns(system.records, system.inertia, Train.SWINGS)
+    return math.sqrt(max(system.left_beside(torque, best, columns), 0.0))

@@ -295,6 +295,18 @@ class System:
         last = self.std[-2 * background - LEANING :]
         self.std[-2 * background - LEANING :] = np.maximum(last, BLURRED * size)
 
+    def left_beside(self, torque: Array, c: Candidate, columns: Array) -> float:
+        """Part of a candidate's cost that is left at least once these columns, shape (n, k), take part freely."""
+        places = np.concatenate([c.columns, self.small])
+        held = np.zeros(places.size)
+        held[c.columns.size :] = self.noise * self.memory / (self.std * self.scale[self.small]) ** 2
+        own = columns / np.maximum(np.linalg.norm(columns, axis=0), DAMPED_AWAY)
+        shared = self.columns[:, places].T @ own
+        inner = inverse_of(self.products[np.ix_(places, places)] + np.diag(held))
+        along = own.T @ self.residual(torque, c)
+        explained = along @ inverse_of(own.T @ own - shared.T @ inner @ shared) @ along
+        return float(1.0 - explained / max(c.cost, 1e-300))
+
     def residual(self, torque: Array, c: Candidate) -> Array:
         """What a candidate leaves, N·m (N)."""
         return self._residuals(torque, [c])[:, 0]

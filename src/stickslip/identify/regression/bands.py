@@ -19,7 +19,7 @@ from stickslip.identify.fit.smooth import Window, seen
 from stickslip.identify.regression.band_fit import BandFit, fit_band
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.creeping import FAR, NOWHERE, Creep, creep_of, steady_lack
-from stickslip.identify.regression.flexible import GIVES, SWINGS, Train, swings_alike
+from stickslip.identify.regression.flexible import GIVES, HARDLY, SWINGS, Train, swings_alike
 from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.orders import candidate_orders, goes_round, shown_orders
 from stickslip.identify.regression.rebuilding import rebuilding_way
@@ -245,6 +245,8 @@ def in_widest(
 
 def freed(rigid: BandFit, fit: Callable[[Train], BandFit]) -> tuple[BandFit, Train, Train | None]:
     """What is fitted with as much give of the train as the rows need, and where that is a swing what else they may."""
+    if rigid.flexible > HARDLY:
+        return rigid, Train.RIGID, None
     gives, swings = fit(Train.GIVES), fit(Train.SWINGS)
     found, train = (gives, Train.GIVES) if gives.misfit < GIVES * rigid.misfit else (rigid, Train.RIGID)
     if swings.misfit < SWINGS * min(gives.misfit, rigid.misfit):
