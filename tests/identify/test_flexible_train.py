@@ -15,55 +15,19 @@ from stickslip.identify.axis.in_sentences import on_bend, on_swing
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.smooth import Window, seen
-from stickslip.identify.regression.flexible import swings_alike
+from stickslip.identify.regression.flexible import Swing, swings_alike, two_inertias
 from stickslip.identify.regression.regression import regress_axis
 from stickslip.identify.regression.together import bend_of
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
+from support.belt import LOAD, MOTOR, coulomb, driven
 
 AXIS = ServoAxis(drive_side="load")
-MOTOR, LOAD, STEP, EVERY = 3e-4, 5e-4, 5e-5, 20
-
-
-def reference(t: float) -> tuple[float, float]:
-    """Moves there and back with ramps of 0.12 s at three speeds, rad and rad/s."""
-    speed = (20.0, 50.0, 110.0)[int(t / 1.6) % 3]
-    phase, side = (t % 0.8) / 0.8, 1.0 if (t % 1.6) < 0.8 else -1.0
-    ramp = min(1.0, phase / 0.15, (0.9 - phase) / 0.15) if phase < 0.9 else 0.0
-    return 0.0, side * speed * max(ramp, 0.0)
-
-
-def driven(frequency: float, friction: Callable[[float], float], seconds: float = 9.6) -> Experiment:
-    """A motor on a spring of a load that swings so often a second with the motor held, under velocity control."""
-    stiffness = LOAD * (2.0 * math.pi * frequency) ** 2
-    damping = 0.1 * math.sqrt(stiffness * LOAD)
-    q, v, x, w, gone, torque = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    rows: list[tuple[float, float, float]] = []
-    noise = np.random.default_rng(5).standard_normal(round(seconds / STEP / EVERY) + 1)
-    for k in range(round(seconds / STEP)):
-        t = k * STEP
-        if k % EVERY == 0:
-            wanted = reference(t)[1]
-            gone += (wanted - v) * STEP * EVERY
-            torque = 0.02 * (wanted - v) + 0.2 * gone
-            rows.append((t, q, torque + 1e-4 * noise[k // EVERY]))
-        spring = stiffness * (q - x) + damping * (v - w)
-        v += STEP * (torque - spring - friction(v)) / MOTOR
-        w += STEP * spring / LOAD
-        q += STEP * v
-        x += STEP * w
-    time, position, drive = np.array(rows).T
-    return Experiment("belt", time, position, drive)
 
 
 def rigid(friction: Callable[[float], float]) -> Experiment:
     """The same with a spring that hardly gives."""
     return driven(160.0, friction)
-
-
-def coulomb(v: float) -> float:
-    """0.2 N·m and 0.8 mN·m·s/rad, the sign rounded within 0.05 rad/s."""
-    return 0.2 * math.tanh(v / 0.05) + 8e-4 * v
 
 
 @pytest.mark.parametrize("frequency", [11.0, 16.0, 25.0])
@@ -74,8 +38,14 @@ def test_a_load_that_swings_behind_a_belt_does_not_count_as_more_inertia(frequen
     assert low < MOTOR + LOAD < high
     assert found.numbers["inertia"].value == pytest.approx(MOTOR + LOAD, rel=0.02)
     assert found.numbers["fc"].value == pytest.approx(0.2, rel=0.03)
+    train, share = found.two_inertias, MOTOR / (MOTOR + LOAD)
+    assert train is not None
+    assert train.frequency_interval[0] < frequency < train.frequency_interval[1]
+    assert train.frequency == pytest.approx(frequency, rel=0.1)
+    assert train.motor_share_interval[0] < share < train.motor_share_interval[1]
+    assert train.motor_share == pytest.approx(share, abs=0.05)
     (said,) = on_swing(found)
-    assert float(said.split(" Hz")[0].split()[-1]) == pytest.approx(frequency, rel=0.1)
+    assert f"resonate at {train.resonance:.3g} Hz" in said
 
 
 def test_a_filter_in_the_column_of_the_torque_does_not_count_as_less_inertia() -> None:
@@ -149,10 +119,30 @@ def test_a_bend_is_what_two_bands_show() -> None:
 
 
 def test_a_swing_is_about_the_same_in_two_bands() -> None:
-    assert swings_alike([-1e-4, -2e-4, 5.0])
-    assert not swings_alike([-1e-4, -3e-4])
-    assert not swings_alike([-1e-4, 1e-4])
-    assert not swings_alike([-1e-4])
+    def alike(*torques: float) -> bool:
+        return swings_alike([Swing(torque, 1e-8, 1e-3) for torque in torques])
+
+    assert alike(-1e-4, -2e-4, 5.0)
+    assert not alike(-1e-4, -3e-4)
+    assert not alike(-1e-4, 1e-4)
+    assert not alike(-1e-4)
+
+
+def test_motor_and_load_are_told_where_two_bands_say_the_same() -> None:
+    """11 Hz with the motor held, 0.3 of the inertia: intervals as wide as the bands differ."""
+    held = (2.0 * math.pi * 11.0) ** -2
+
+    def told(torque: float, share: float) -> Swing:
+        return Swing(-torque, share * torque * 1e-3, 1e-3)
+
+    train = two_inertias([told(held, 0.3), told(1.1 * held, 0.32), told(9.0 * held, 2.0)])
+    assert train is not None
+    assert train.frequency_interval[0] < 11.0 / math.sqrt(1.1) < 11.0 < train.frequency_interval[1]
+    assert train.motor_share == pytest.approx(0.31)
+    assert train.resonance == pytest.approx(train.frequency / math.sqrt(0.31))
+    for other in (told(2.0 * held, 0.3), told(held, 0.6), told(held, 1.2), told(-held, 0.3)):
+        assert two_inertias([told(held, 0.3), other]) is None
+    assert two_inertias([told(held, 0.3)]) is None
 
 
 @pytest.mark.parametrize("order", [0, 1, 2, 3, 4])

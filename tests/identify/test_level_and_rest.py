@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.identify.axis.agreed import BAND_ALONE, told_apart
+from stickslip.identify.axis.agreed import BAND_ALONE, plain_value, told_apart
 from stickslip.identify.axis.falling import AT_REST, NO_LEVEL, widened, with_level, with_rest
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.result import HELD_BY_FRICTION, constant_torque_told
@@ -18,6 +18,7 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter
 from stickslip.identify.fit.smooth import Window
 from stickslip.identify.regression.bands import WEIGHT
+from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.identify.regression.number import Number
 from stickslip.identify.regression.rebuilding import rebuilt_within
 from stickslip.identify.regression.regression import (
@@ -159,6 +160,26 @@ def test_inertia_and_level_that_one_band_alone_tells_are_not_identified(logs: An
     calm, _ = regressed(logs, 4, "held", 1000, "p-pi", "production", "clean")
     (kept,) = told_apart([estimate("inertia", value, 0.97 * value, 1.03 * value)], calm, COULOMB)
     assert kept.identified
+
+
+def test_what_one_band_alone_tells_is_identified_where_plain_inverse_dynamics_says_the_same(
+    logs: Any,
+) -> None:
+    """As sure, and within the interval: another band tells it too."""
+    log = logs.draw(1030398, "actual", 1000, "pid", "steps", "flexible")
+    experiment = Experiment("log", log.time, log.position, log.torque)
+    found, plain = regress_axis([experiment], AXIS), inverse_dynamics([experiment], AXIS)
+    assert not found.confirmed("inertia")
+    value, half = plain_value("inertia", plain) or (math.nan, math.nan)
+
+    def judged(middle: float, width: float) -> Estimate:
+        inertia = estimate("inertia", middle, middle - width, middle + width)
+        (out,) = told_apart([inertia], found, COULOMB, plain)
+        return out
+
+    assert judged(value, 1.1 * half).identified
+    assert judged(value, 0.9 * half).verdict == BAND_ALONE
+    assert judged(value + 2.5 * half, 2.0 * half).verdict == BAND_ALONE
 
 
 def test_a_level_beside_an_untold_slope_is_no_surer_than_a_laws_form() -> None:

@@ -157,7 +157,11 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
         "--position", dest="position_map", action="store_true",
         help="find the torque over the angle (cogging, friction by angle), take it out and write its map",
     )  # fmt: skip
-    parser.add_argument("--load", action="store_true", help="include friction that grows with the gear load")
+    parser.add_argument(
+        "--load", action="store_true",
+        help="let all friction, viscous included, grow with the load of the gear: times 1 + |load_motor T + "
+        "load_external T0|, T the drive's torque and T0 that from outside",
+    )  # fmt: skip
     parser.add_argument(
         "--intervals", choices=("prediction", "covariance"), default="prediction",
         help="source of the intervals; covariance is too narrow under coloured noise",

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from stickslip.config import Table, read_toml
-from stickslip.errors import InputError
+from stickslip.errors import InputError, ParameterError
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.motion import Motion, motion_in
+from stickslip.machines.two_inertias import TwoInertias
 from stickslip.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -45,6 +46,8 @@ class Identified:
         Quantiles (0, 0.1, ..., 1) of the recorded speeds, rad/s: "positive" and "negative"; empty where not known.
     law_file : str
         Path of the law's file; empty where the law is registered.
+    train : TwoInertias or None
+        Motor and load behind a spring, where the record told them.
     """
 
     path: Path
@@ -58,6 +61,7 @@ class Identified:
     trajectory: Motion | None = None
     speeds: Mapping[str, Array] = field(default_factory=dict[str, Array])
     law_file: str = ""
+    train: TwoInertias | None = None
 
     def unit(self, angular: str) -> str:
         """A unit of the angular system in the axis's own."""
@@ -123,7 +127,26 @@ def identified_in(table: Table) -> Identified:
         motion_in(content, str(file)),
         {k: np.abs(np.array(v, dtype=np.float64)) for k, v in dict(content.get("speeds", {})).items()},
         str(table.document.folder / law) if (law := str(content["law"])).endswith(".py") else "",
+        train_in(content, file),
     )  # fmt: skip
+
+
+def train_in(content: Mapping[str, Any], file: Path) -> TwoInertias | None:
+    """Motor and load of a file's content, where it has them.
+
+    Raises
+    ------
+    InputError
+        If its table is damaged.
+    """
+    if "drivetrain" not in content:
+        return None
+    try:
+        return TwoInertias.from_dict(content["drivetrain"])
+    except (KeyError, TypeError, ValueError, ParameterError) as error:
+        raise InputError(
+            f"{file}: its drivetrain cannot be read ({error}); identify the axis again"
+        ) from None
 
 
 def covariance(estimates: tuple[Estimate, ...], correlation: Array, logarithmic: list[bool]) -> Array:

@@ -20,9 +20,11 @@ import numpy as np
 from stickslip.config import Document, Table
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.regression.regression import Regression
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
+from stickslip.machines.two_inertias import TwoInertias
 from stickslip.model import MODEL_FORMAT, Model
 
 
@@ -117,6 +119,9 @@ def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: st
         out["axis"] = {"offset": float(found.details["constant_torque"])}
     if isinstance(axis, ServoAxis):
         out["axis"] = out.get("axis", {}) | {"seen_from": axis.seen_from, "gear_ratio": axis.gear_ratio}
+    train = told_train(found)
+    if train is not None:
+        out["drivetrain"] = train.as_dict()
     angle: Any = found.details.get("angle")
     if isinstance(angle, AngleMap):
         out["angle"] = angle.as_dict()
@@ -130,6 +135,12 @@ def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: st
     out["data"] = [dict(d) for d in data]
     out["versions"] = versions()
     return out
+
+
+def told_train(found: Identification) -> TwoInertias | None:
+    """Motor and load behind a spring, where the records told them."""
+    regression: Any = found.details.get("regression")
+    return regression.two_inertias if isinstance(regression, Regression) else None
 
 
 def _law(model: Model, law: str) -> dict[str, Any]:

@@ -3,7 +3,8 @@
 Drawn are the identified numbers (friction, inertia, offset) from their intervals, and what no model holds but every
 machine has: a torque over the position of up to the misfit of the model, a current loop, a delay below one sample, and
 friction that comes later than the contact's own springs bring it (an elastic drivetrain, backlash), and a reference
-velocity of the instant or of the sample before.
+velocity of the instant or of the sample before. Where the record told motor and load behind a spring, they are drawn
+from its intervals, with friction at the load.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ from stickslip.identify.axis.falling import missing_fall
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.monte_carlo import draw_models
+from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.machine import Machine
+from stickslip.machines.two_inertias import TwoInertias
 from stickslip.model import Model
 from stickslip.recommend.plant import Plant
 
@@ -54,6 +57,8 @@ GIVEN = 0.1
 """Part of an inertia to which a user knows it."""
 DAMPING = 0.3
 """Of the bristles, part of critical."""
+DAMPED = (0.01, 0.1)
+"""Of the spring between motor and load, part of critical, drawn."""
 
 
 def plants_of(
@@ -79,8 +84,8 @@ def plants_of(
     given : bool
         Whether the inertia is one that the user knows: then to `GIVEN`, where the record does not tell it.
     machine : Machine, optional
-        The machine at hand: its delay, current loop and torques over the position are not drawn then, but the angle at
-        which the motion begins, and the noise.
+        The machine at hand: its delay, current loop, springs and torques over the position are not drawn then, but the
+        angle at which the motion begins, and the noise.
     """
     known = {name: float(found.axis.get(name, 0.0) or 0.0) for name in ("offset", "gravity", "gravity_angle")}
     yield Plant(
@@ -88,12 +93,13 @@ def plants_of(
         found.model,
         offset=known["offset"],
         waves=_hanging(known["gravity"], known["gravity_angle"], start),
+        flexible=found.train.axis(inertia) if found.train else None,
         machine=machine,
     )
     told = next((e for e in found.estimates if e.name == "inertia"), None)
     identified = told.value if told else inertia
     known_to = GIVEN if given and told and not told.identified else math.inf
-    rng, unseen = np.random.default_rng(seed), np.random.default_rng([seed, 2])
+    rng, unseen, swings = (np.random.default_rng(s) for s in (seed, [seed, 2], [seed, 3]))
     misfit = next((found.misfit[k] for k in LEFT if math.isfinite(found.misfit.get(k, math.nan))), 0.0)
     most = found.misfit.get("friction_rebuilt_within", math.inf)
     drawn = draw_models(
@@ -109,6 +115,7 @@ def plants_of(
                 *_hanging(here["gravity"], here["gravity_angle"], start),
                 *(() if told_of(machine) else _unmodelled(misfit * float(rng.uniform()), found.motion, rng)),
             ),
+            flexible=_swinging(found.train, own, swings),
             **(_late(rng) if machine is None else _turned(machine, rng)),
         )  # fmt: skip
 
@@ -143,6 +150,16 @@ def _late(rng: np.random.Generator) -> dict[str, Any]:
     prompt, delay, bandwidth = float(rng.uniform()), float(rng.uniform()), _between(rng, *CURRENT_LOOP)
     late = {} if prompt < PROMPT else {"delay": delay, "bandwidth": bandwidth}
     return {**late, "backward": bool(rng.uniform() < 0.5)}
+
+
+def _swinging(train: TwoInertias | None, inertia: float, rng: np.random.Generator) -> FlexibleAxis | None:
+    """Motor and load of these intervals; none where the record told none."""
+    if train is None:
+        return None
+    frequency, share = (
+        float(rng.uniform(*i)) for i in (train.frequency_interval, train.motor_share_interval)
+    )
+    return train.axis(inertia, _between(rng, *DAMPED), frequency, share)
 
 
 def told_of(machine: Machine | None) -> bool:

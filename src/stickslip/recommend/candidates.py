@@ -294,7 +294,10 @@ def rings_alone(bench: Bench, inertia: float, torque: str) -> str:
     if gains is None:
         return f"{where} {on}; lower its gains, or take a finer encoder or a shorter sample time"
     swing, plants = max(swing for _, _, swing in ringing), [plant for plant, _, _ in ringing]
-    size = f" (at rest by up to {swing:.2g} {'m' if torque == 'N' else 'rad'} peak to peak)"
+    size = (
+        f" (at rest by up to {swing:.2g} {'m' if torque == 'N' else 'rad'} peak to peak)" if math.isfinite(swing)
+        else " (it diverges)"
+    )  # fmt: skip
     # What swings wider than counts allow is at most set off by them: an exact encoder only delays it.
     wide = integral_of(gains)[1] > 0.0 and swing > between_counts(drive.encoder_counts)
     counts = not wide and by_counts(plants, bench.linear, drive)

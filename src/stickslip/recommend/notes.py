@@ -11,6 +11,7 @@ from stickslip.control.own_loop import USUAL_TIME
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
+from stickslip.machines.two_inertias import TwoInertias
 from stickslip.recommend.candidate_run import Drive, Trial, run
 from stickslip.recommend.candidates import Bench, Candidate, resistance
 from stickslip.recommend.sample_time import ROWS
@@ -124,7 +125,7 @@ def notes_on(
             f"A constant torque of {offset} acts in addition to friction: it is part of what is recommended, "
             "simulated and exported."
         )
-    yield _simulated(machine)
+    yield _simulated(machine, found.train)
 
 
 def _intervals(found: Identified, unknown: Sequence[str]) -> Iterator[str]:
@@ -162,11 +163,18 @@ def _none(candidates: Sequence[Candidate], unknown: Sequence[str]) -> Iterator[s
         )
 
 
-def _simulated(machine: Machine | None) -> str:
+def _simulated(machine: Machine | None, train: TwoInertias | None) -> str:
     """What was simulated, what was not, and how the interval allows for that."""
+    axis, beside = "a rigid axis", "resonances"
+    if train is not None:
+        axis = (
+            f"motor and load behind a spring as identified (they resonate at {train.resonance:.3g} Hz; friction at the "
+            "load)"
+        )
+        beside = "further resonances"
     simulated = (
-        "Simulated with a rigid axis, a current loop, up to a sample of delay, friction that comes late as "
-        "behind an elastic drivetrain, and position-dependent torques as large as the model's misfit; resonances, "
+        f"Simulated with {axis}, a current loop, up to a sample of delay, friction that comes late as "
+        f"behind an elastic drivetrain, and position-dependent torques as large as the model's misfit; {beside}, "
         "backlash and noise in the current are not in it (in place of noise a feedback is pushed at rest): for them"
     )
     if machine is not None:

@@ -1,4 +1,5 @@
-"""An axis on which a setting is tried, as the machine engine runs it: rigid, or on the machine at hand.
+"""An axis on which a setting is tried, as the machine engine runs it: rigid, with motor and load behind
+a spring, or on the machine at hand.
 
 The machine at hand brings what was measured of it: its inertias and springs (resonances), encoder, amplifier, delay,
 cogging and ripple. Friction and the whole inertia are the drawn axis's: they are what was identified, bearings and
@@ -16,6 +17,7 @@ import numpy as np
 
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
+from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.machines.rigid import RigidAxis
@@ -40,8 +42,10 @@ class Plant(RigidAxis):
     backward : bool
         Whether the drive's reference velocity is the mean over the sample before, half a sample late, as the velocity
         that it measures; else that of the instant.
+    flexible : FlexibleAxis or None
+        Motor and load behind a spring; None: a rigid axis.
     machine : Machine or None
-        The machine at hand, in place of ``delay`` and ``bandwidth``; None: a rigid axis.
+        The machine at hand, in place of ``delay``, ``bandwidth`` and ``flexible``.
     """
 
     offset: float = 0.0
@@ -49,6 +53,7 @@ class Plant(RigidAxis):
     delay: float = 0.0
     bandwidth: float = math.inf
     backward: bool = False
+    flexible: FlexibleAxis | None = None
     machine: Machine | None = None
 
     @cached_property
@@ -57,11 +62,12 @@ class Plant(RigidAxis):
         return {}
 
     def built(self, sample_time: float, counts: float) -> Machine:
-        """The machine that it is, sampled every `sample_time` s, with an encoder of `counts` where it is rigid."""
+        """The machine that it is, sampled every `sample_time` s, with an encoder of `counts` where none is at hand."""
         if self.machine is None:
             return Machine(
-                "axis", self.inertia, Contact(self.friction), amplifier=Amplifier(1.0, bandwidth=self.bandwidth),
-                delay=self.delay, sample_time=sample_time, encoder=Encoder(counts),
+                "axis", self.inertia, Contact(self.friction), flexible=self.flexible,
+                amplifier=Amplifier(1.0, bandwidth=self.bandwidth), delay=self.delay, sample_time=sample_time,
+                encoder=Encoder(counts),
             )  # fmt: skip
         known = self.machine.without("bearings", "direction")
         part = self.inertia / known.inertia

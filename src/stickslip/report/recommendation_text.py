@@ -14,13 +14,13 @@ from stickslip.recommend.recommend import Candidate, Recommendation
 
 def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str]:
     """The setting, what to expect, and what was tried; `unit` turns an angular unit into the axis's own."""
-    out = [
-        f"{'law':<16}{'structure':<13}{'gain':>5}  {'deadband':>8}  {'error left':>10}  {'worst':>7}  safe"
-    ]
+    deadband = f"deadband, {unit('rad/s')}"
+    wide = len(deadband)
+    out = [f"{'law':<16}{'structure':<13}{'gain':>5}  {deadband}  {'error left':>10}  {'worst':>7}  safe"]
     for c in result.candidates:
         x = c.setting
         mark = "<- " if result.chosen and (x.law, x.kind, x.gain, x.deadband) == same(result.chosen) else ""
-        out.append(f"{x.law:<16}{x.kind:<13}{x.gain:>5.3g}  {x.deadband:>8.3g}  {100 * c.errors[0]:>8.1f} %  "
+        out.append(f"{x.law:<16}{x.kind:<13}{x.gain:>5.3g}  {x.deadband:>{wide}.3g}  {100 * c.errors[0]:>8.1f} %  "
               f"{100 * c.worst:>5.1f} %  {mark}{safety(c)}")  # fmt: skip
     out.append("")
     path = result.drive.path

@@ -47,15 +47,23 @@ def on_width(found: Regression | None) -> list[str]:
 def on_swing(found: Regression | None) -> list[str]:
     """That a load swings behind a spring, or that the torque's column is filtered, in a sentence; nothing where neither
     shows."""
-    swings = [] if found is None else [b.swing for b in found.bands if b.swing]
-    if not swings:
+    swings = [] if found is None else [b.swing.torque for b in found.bands if b.swing.torque]
+    if found is None or not swings:
         return []
     swing = statistics.median(swings)
     if swing < 0.0:
-        frequency = 1.0 / (2.0 * math.pi * math.sqrt(-swing))
+        frequency, told = 1.0 / (2.0 * math.pi * math.sqrt(-swing)), found.two_inertias
+        at, both = f"about {frequency:.2g} Hz", ""
+        if told is not None:
+            (low, high), (least, most) = told.frequency_interval, told.motor_share_interval
+            at = f"{told.frequency:.3g} Hz [{low:.3g}, {high:.3g}]"
+            both = (
+                f", the motor has {told.motor_share:.2g} [{least:.2g}, {most:.2g}] of the inertia, and both resonate "
+                f"at {told.resonance:.3g} Hz"
+            )
         return [
-            f"Motor and load do not move as one: with the motor held the load swings at about {frequency:.2g} Hz; this "
-            "is allowed for, and the inertia is that of both."
+            f"Motor and load do not move as one: with the motor held the load swings at {at}{both}; this is allowed "
+            "for, and the inertia is that of both."
         ]
     return [
         f"The torque column lags as behind a filter of about {1e3 * math.sqrt(2.0 * swing):.2g} ms; this is allowed "

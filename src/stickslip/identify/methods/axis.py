@@ -80,8 +80,7 @@ def refuse_for_every_law(axis: ServoAxis, experiments: Sequence[Experiment], opt
     inertia = options.values.get("inertia", 1.0)
     if not inertia > 0.0:
         raise InputError(f"inertia = {inertia:g} {axis.unit('kg·m²')} must be greater than 0")
-    count = options.harmonics
-    of_axis = {p.name for p in mechanics_parameters(axis, experiments[0].quantity, {}, count, count)}
+    of_axis = {p.name for p in mechanics_parameters(axis, experiments[0].quantity, {}, 0, 0)}
     known = of_axis | {f.name for x in options.laws or AUTOMATIC for f in law_of(x).fields} | LEVELS
     names = [*options.values, *options.free, *options.frozen]
     # One direction's own parameters, and torques over the position, are known where they are searched for.

@@ -28,7 +28,7 @@ from stickslip.identify.regression.band_system import (
 )
 from stickslip.identify.regression.bent import bent_in, explains
 from stickslip.identify.regression.drifting import drift_rows
-from stickslip.identify.regression.flexible import Train, flexible_columns
+from stickslip.identify.regression.flexible import Swing, Train, flexible_columns
 from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import memory_of
@@ -79,8 +79,8 @@ class BandFit:
     relative : float
         The same over the RMS of the torque.
     rows, pieces : int
-    swing : float
-        Coefficient of the torque's second derivative where a load swings, s²; else 0.
+    swing : Swing
+        What the second derivatives of torque and acceleration say, where a load swings.
     bend : float
         Part of Fc by which friction rises with velocity in another form (`stickslip.identify.regression.bent`).
     flexible : float
@@ -98,7 +98,7 @@ class BandFit:
     relative: float
     rows: int
     pieces: int
-    swing: float
+    swing: Swing
     bend: float
     flexible: float
 

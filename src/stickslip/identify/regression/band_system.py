@@ -19,7 +19,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.regression.drifting import MAY_DRIFT, drift_columns, drift_unseen
-from stickslip.identify.regression.flexible import Train, flexible_columns
+from stickslip.identify.regression.flexible import STILL, Swing, Train, flexible_columns
 from stickslip.identify.regression.rounding import rounded_sums
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
@@ -318,11 +318,12 @@ class System:
             coefficients[c.columns, k], coefficients[self.small, k] = c.values, c.small
         return torque[:, None] - self.columns @ coefficients
 
-    def swing_of(self, c: Candidate) -> float:
-        """Coefficient of the torque's second derivative in a candidate, s²; 0 where no load swings."""
+    def swing_of(self, c: Candidate) -> Swing:
+        """What a candidate says of a swing; `STILL` where no load swings."""
         if self.train is not Train.SWINGS:
-            return 0.0
-        return float(c.small[Train.GIVES.value] / self.scale[self.small[Train.GIVES.value]])
+            return STILL
+        acceleration, torque = (float(c.small[i] / self.scale[self.small[i]]) for i in range(2))
+        return Swing(torque, acceleration, float(c.values[INERTIA] / self.scale[INERTIA]))
 
     def weights(self, candidates: Sequence[Candidate]) -> Array:
         """Probability of every candidate after the record."""

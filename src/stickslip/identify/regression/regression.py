@@ -28,6 +28,7 @@ from stickslip.identify.regression.creeping import NOWHERE, Creep
 from stickslip.identify.regression.drifted import calm_beside_drift
 from stickslip.identify.regression.drifting import DRIFTS, drift_torque
 from stickslip.identify.regression.falls import Falling, fall_of
+from stickslip.identify.regression.flexible import two_inertias
 from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.orders import without_waves
 from stickslip.identify.regression.rebuilding import rebuilt_within
@@ -41,6 +42,7 @@ from stickslip.identify.regression.sliding_rows import (
 from stickslip.identify.regression.strokes import stacked
 from stickslip.identify.regression.together import ROTATED, as_told, holding, that_tell, together, with_form
 from stickslip.machines.servo import ServoAxis
+from stickslip.machines.two_inertias import TwoInertias
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -186,6 +188,11 @@ class Regression:
     def drifts(self) -> bool:
         """Whether friction is taken to drift over the record."""
         return "drift" in self.numbers
+
+    @property
+    def two_inertias(self) -> TwoInertias | None:
+        """Motor and load behind a spring, where the two widest bands tell them and its numbers are to be believed."""
+        return None if self.doubt else two_inertias([b.swing for b in self.bands])
 
     @property
     def both_forms(self) -> bool:
