@@ -110,6 +110,22 @@ def test_a_loop_that_the_belt_does_not_bear_gets_no_compensator(belt: Identified
     assert ss.recommend(replace(belt, train=None), bandwidth=30.0, **WAYS).recommendation.chosen is not None
 
 
+def test_a_comparison_says_whether_the_spring_has_changed(belt: Identified) -> None:
+    train = belt.train
+    assert train is not None
+    low, high = train.frequency_interval
+    slack = replace(train, frequency=0.8 * train.frequency, frequency_interval=(0.8 * low, 0.8 * high))
+    notes = ss.compare(belt, replace(belt, train=slack)).notes
+    (said,) = [note for note in notes if "motor held" in note]
+    assert "-20 % [-24, -16]" in said
+    assert "softer" in said
+    (same,) = [note for note in ss.compare(belt, belt).notes if "motor held" in note]
+    assert "no change of the spring shows" in same
+    (one,) = [note for note in ss.compare(replace(belt, train=None), belt).notes if "spring" in note]
+    assert one.startswith("Only model.toml tells")
+    assert not [n for n in ss.compare(*[replace(belt, train=None)] * 2).notes if "spring" in n]
+
+
 @pytest.mark.parametrize(
     ("damage", "said"),
     [

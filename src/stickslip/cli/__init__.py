@@ -54,8 +54,8 @@ WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "learn": {"file": ("simulation", "model")},
     "study": {"study": ("study",)},
     "export": {"file": ("model", "simulation", "map")},
-    "rig": {"rig": ("rig", "machine")},
-    "machine": {"name": ("machine",)},
+    "rig": {"rig": ("rig", "machine", "model")},
+    "machine": {"name": ("machine", "model")},
 }
 """Per verb and argument, the kinds of file that it takes, or knows better what to say of; records are looked at where
 they are read."""

@@ -5,6 +5,7 @@
     stickslip machine thesis-dry --print > mine.toml  its file, to be changed
     stickslip machine --template > mine.toml          a file with every key, its unit, meaning and default
     stickslip machine mine.toml                       checks a file of your own
+    stickslip machine model.toml --print > axis.toml  the axis that was identified, as a machine
 
 A machine's file runs in `stickslip simulate`, studies and sweeps (a table [machine] or [machines.NAME] with
 `machine = "mine.toml"`), on a virtual rig (`stickslip rig run NAME --rig mine.toml`), and in Python
@@ -28,7 +29,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """The name, and what is printed."""
     parser.add_argument(
         "name", nargs="?", default="", metavar="MACHINE",
-        help="machine of the package, or the path of a machine's TOML file (default: list those of the package)",
+        help="machine of the package, or the path of a machine's TOML file or of an identified model.toml (default: "
+        "list those of the package)",
     )  # fmt: skip
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--print", action="store_true", help="print the machine's TOML file, to be changed")
@@ -42,9 +44,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the list, the machine, its file, or the one to begin from."""
     from stickslip.cli import _output
+    from stickslip.config import read_toml
     from stickslip.errors import InputError
     from stickslip.machines import written
     from stickslip.machines.files import file_of, library, machine
+    from stickslip.machines.identified import is_identified
 
     if args.template:
         print(written.template(), end="")
@@ -57,7 +61,13 @@ def run(args: argparse.Namespace) -> int:
         return 0
     found = machine(args.name)
     if args.print:
-        print(file_of(args.name).read_text(encoding="utf-8"), end="")
+        path = file_of(args.name)
+        own = (
+            written.machine_text(found)
+            if is_identified(read_toml(path))
+            else path.read_text(encoding="utf-8")
+        )
+        print(own, end="")
     elif args.json:
         _output.print_json({"name": found.name, **written.tables_of(found)})
     else:

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from stickslip.config import Table, read_toml
-from stickslip.errors import InputError, ParameterError
+from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.motion import Motion, motion_in
+from stickslip.machines.identified import train_in
 from stickslip.machines.two_inertias import TwoInertias
 from stickslip.model import Model
 
@@ -127,26 +128,8 @@ def identified_in(table: Table) -> Identified:
         motion_in(content, str(file)),
         {k: np.abs(np.array(v, dtype=np.float64)) for k, v in dict(content.get("speeds", {})).items()},
         str(table.document.folder / law) if (law := str(content["law"])).endswith(".py") else "",
-        train_in(content, file),
+        train_in(content, str(file)),
     )  # fmt: skip
-
-
-def train_in(content: Mapping[str, Any], file: Path) -> TwoInertias | None:
-    """Motor and load of a file's content, where it has them.
-
-    Raises
-    ------
-    InputError
-        If its table is damaged.
-    """
-    if "drivetrain" not in content:
-        return None
-    try:
-        return TwoInertias.from_dict(content["drivetrain"])
-    except (KeyError, TypeError, ValueError, ParameterError) as error:
-        raise InputError(
-            f"{file}: its drivetrain cannot be read ({error}); identify the axis again"
-        ) from None
 
 
 def covariance(estimates: tuple[Estimate, ...], correlation: Array, logarithmic: list[bool]) -> Array:

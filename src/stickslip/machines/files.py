@@ -1,5 +1,7 @@
 """Reading a machine from the TOML file that describes it; those of the package lie in ``machines/library``.
 
+A model.toml of `stickslip identify` is one too (`stickslip.machines.identified`).
+
 `stickslip.machines.keys` has the keys of such a file, `stickslip.machines.written` writes one.
 """
 
@@ -18,6 +20,7 @@ from stickslip.errors import ModelRemark, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.flexible import FlexibleAxis
+from stickslip.machines.identified import identified_machine, is_identified
 from stickslip.machines.keys import BY_NAME
 from stickslip.machines.machine import Machine, Sensor
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
@@ -64,7 +67,8 @@ def file_of(name: str | os.PathLike[str]) -> Path:
 
 @arguments_checked
 def load_machine(name: str | os.PathLike[str]) -> Machine:
-    """The machine of that name (`library`), or of the TOML file at that path.
+    """The machine of that name (`library`), or of the TOML file at that path: a machine's, or a model.toml of
+    `identify`.
 
     Parameters
     ----------
@@ -79,7 +83,10 @@ def load_machine(name: str | os.PathLike[str]) -> Machine:
 
 
 def _read(path: Path) -> Machine:
-    with read_toml(path) as top, top.blamed():
+    content = read_toml(path)
+    if is_identified(content):
+        return identified_machine(content, path.stem)
+    with content as top, top.blamed():
         friction, notes = _friction(top.table("friction")), _notes(top)
         own = BY_NAME[""].read(top)
         flexible, stiffness = _flexible(top)

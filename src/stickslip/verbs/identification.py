@@ -20,11 +20,10 @@ from stickslip.extras import needed
 from stickslip.finding import Finding
 from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.identify.identified_file import Identified, identified_in
-from stickslip.identify.model_file import in_memory, model_content, told_train, versions, write_model
+from stickslip.identify.model_file import in_memory, model_content, versions, write_model
 from stickslip.identify.motion import motion_of, speeds_of
-from stickslip.machines.contact import Contact
+from stickslip.machines.identified import identified_machine
 from stickslip.machines.machine import Machine
-from stickslip.machines.motor import Harmonics
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
@@ -106,25 +105,16 @@ class IdentificationResult:
         """The axis as a machine, with a pendulum's gravity (cogging of order 1), and with motor and load behind a
         spring where the record told them (damped by 0.03 of critical, which it does not tell; friction at the load).
 
-        Its sample time is 1 ms, its amplifier and encoder are ideal: ``dataclasses.replace`` changes what is known. A
-        constant offset has no place in it. ``machine.write("machine.toml")`` makes a file of it.
+        As `load_machine` reads the saved model. Its sample time is 1 ms, its amplifier and encoder are ideal:
+        ``dataclasses.replace`` changes what is known. A constant offset has no place in it.
+        ``machine.write("machine.toml")`` makes a file of it.
 
         Raises
         ------
         InputError
-            As of `axis`.
+            Where no inertia was identified or no law.
         """
-        axis, at = self.axis, self.identification.details["mechanics"]
-        weight = (
-            Harmonics((1.0,), (float(at.gravity),), (0.5 * math.pi - float(at.gravity_angle),))
-            if at.gravity
-            else Harmonics()
-        )
-        train = told_train(self.identification)
-        return Machine(
-            "identified", axis.inertia, Contact(self.model), cogging=weight,
-            flexible=train.axis(axis.inertia) if train else None,
-        )  # fmt: skip
+        return identified_machine(self.table(), "identified")
 
     @property
     def position_map(self) -> PositionMap | None:

@@ -23,6 +23,7 @@ from stickslip.identify.compare.levels import (
 from stickslip.identify.compare.motor_or_load import on_one_side
 from stickslip.identify.compare.same_turn import ANGLE, in_one_turn, without_angle
 from stickslip.identify.compare.text import lines
+from stickslip.identify.compare.trains import on_trains
 from stickslip.identify.estimate import Estimate, Picture, Trace
 from stickslip.identify.identified_file import Identified, covariance
 from stickslip.identify.monte_carlo import curve_band, sliding_torque
@@ -158,7 +159,8 @@ def compare_models(
     levels = tuple(replace(c, decides=changed) for c in levels)
     summary = said_of(changes, levels, own, changed, untold(first, second))
     return Comparison(
-        changes, p, velocity, difference, band, curve_p, changed, (*notes, *unseen(changes, levels), said),
+        changes, p, velocity, difference, band, curve_p, changed,
+        (*notes, *on_trains(first, second), *unseen(changes, levels), said),
         picture_of(first, velocity, sides, summary, (first, second)), levels, summary,
     )  # fmt: skip
 
