@@ -205,7 +205,8 @@ def test_columns_that_are_not_used_are_listed(
         ("study", "sweep.toml", "is a sweep, not a study", "stickslip sweep sweep.toml"),
         ("export --to c99", "log.csv", "is a record, not a model", "stickslip identify log.csv"),
         ("export --to c99", "study.toml", "is a study, not a model", "stickslip study study.toml"),
-        ("rig run breakaway --rig", "model.toml", "is a model, not a rig", "stickslip recommend"),
+        ("rig run breakaway --rig", "study.toml", "is a study, not a rig", "stickslip study study.toml"),
+        ("rig run breakaway --rig", "model.toml", "holds no inertia", "identify the axis"),
         ("rig commission --rig", "log.csv", "is a record, not a rig", "stickslip identify log.csv"),
     ],
 )

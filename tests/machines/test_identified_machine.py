@@ -68,6 +68,7 @@ def test_it_is_shown_printed_and_run(
     ("content", "said"),
     [
         (HEAD + LAW, "holds no inertia"),
+        (HEAD.partition("\n")[2] + LAW, "holds no inertia"),
         (HEAD + LAW + "[axis]\ninertia = -1.0\n", "holds no inertia"),
         (HEAD + LAW + '[axis]\ninertia = "much"\n', "axis.inertia = 'much' must be a number"),
         (HEAD + LAW + PENDULUM + BELT.replace("0.25", "0.5"), r"motor_share = 0.5 \[0.2, 0.3\]"),

@@ -23,7 +23,8 @@ BEHIND = "Its spring is damped by {damping:g} of critical, which the record does
 
 def is_identified(table: Table) -> bool:
     """Whether a file's content is that of a model.toml, and not of a machine."""
-    return "format" in table.values and "friction" not in table.values
+    content = table.values
+    return "law" in content and ("parameters" in content or "format" in content) and "friction" not in content
 
 
 def identified_machine(table: Table, name: str) -> Machine:

@@ -23,6 +23,8 @@ WORTH = 0.95
 ALLOWANCE, BETTER = 1.4, 2.0
 """Factors on the error left, upwards and downwards, for resonances, backlash, cogging and the like, which a machine has
 or has not: so the promise held in `benchmarks/promise.py`."""
+BETTER_AT_MOTOR = 5.0
+"""The second where friction is simulated at the load, and may act at the motor: so it held in `benchmarks/belts.py`."""
 HARDLY = f"hardly less error (more than {100.0 * WORTH:g} % left)"
 UNSURE = f"no certain reduction (more than {100.0 / ALLOWANCE:.0f} % left)"
 """Why a safe setting is not worth it."""
@@ -163,6 +165,11 @@ def _none(candidates: Sequence[Candidate], unknown: Sequence[str]) -> Iterator[s
         )
 
 
+def better_than_simulated(machine: Machine | None, train: TwoInertias | None) -> float:
+    """Times as small as simulated, that the error left may be."""
+    return BETTER if train is None or machine is not None else BETTER_AT_MOTOR
+
+
 def _simulated(machine: Machine | None, train: TwoInertias | None) -> str:
     """What was simulated, what was not, and how the interval allows for that."""
     axis, beside = "a rigid axis", "resonances"
@@ -183,6 +190,6 @@ def _simulated(machine: Machine | None, train: TwoInertias | None) -> str:
             "friction that comes late as behind backlash; what the machine's file leaves out is not in it: for that"
         )
     return (
-        f"{simulated} the interval takes the error left as up to {ALLOWANCE:g} times as large and down to {BETTER:g} "
-        "times as small."
+        f"{simulated} the interval takes the error left as up to {ALLOWANCE:g} times as large and down to "
+        f"{better_than_simulated(machine, train):g} times as small."
     )

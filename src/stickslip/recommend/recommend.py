@@ -37,6 +37,7 @@ from stickslip.recommend.notes import (
     UNSURE,
     WORTH,
     axes_left_out,
+    better_than_simulated,
     lag_of,
     notes_on,
     sampled_as,
@@ -139,7 +140,7 @@ def recommend(
     return Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, linear.numbers(),
         first.moving["position_rms_rad"], margin, unsafe_gain, tuple(candidates), len(bench.plants),
-        tuple(notes), drive, rung, j, beside, hunts,
+        tuple(notes), drive, rung, j, beside, hunts, better_than_simulated(drive.machine, found.train),
     )  # fmt: skip
 
 

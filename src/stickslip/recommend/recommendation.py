@@ -44,6 +44,8 @@ class Recommendation:
         Compensators of the catalogue that were tried besides, best first.
     hunts : str
         What the chosen setting does at rest for long, where compensators were tried besides and it goes to and fro.
+    better : float
+        Times as small as simulated, that the error left may be.
     """
 
     chosen: Candidate | None
@@ -60,6 +62,7 @@ class Recommendation:
     inertia: float = math.nan
     beside: tuple[Beside, ...] = ()
     hunts: str = ""
+    better: float = BETTER
 
     @property
     def instead(self) -> Beside | None:
@@ -75,12 +78,12 @@ class Recommendation:
         and the best estimate.
 
         Of n drawn axes they hold the reduction on another one with a probability of (n - 1)/(n + 1), 95 % for 39, or a
-        little more: the best estimate may widen them. They are moved apart by `ALLOWANCE` and `BETTER`,
+        little more: the best estimate may widen them. They are moved apart by `ALLOWANCE` and `better`,
         for what machines have and the simulation has not.
         """
         if self.chosen is None:
             return 0.0, 0.0
-        return 1.0 - ALLOWANCE * max(self.chosen.errors), 1.0 - min(self.chosen.errors) / BETTER
+        return 1.0 - ALLOWANCE * max(self.chosen.errors), 1.0 - min(self.chosen.errors) / self.better
 
     @property
     def usual_reduction(self) -> float:

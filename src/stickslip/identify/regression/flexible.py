@@ -34,8 +34,9 @@ HARDLY = 0.9
 records none was taken to give or to swing where they leave more than 0.82 so."""
 ALIKE = 2.5
 """Times by which the swing's coefficient may be another one in another band: play swings differently in each."""
-SURE_FREQUENCY, SURE_SHARE = 0.03, 0.03
-"""Half-widths at least: part of the frequency, and the motor's part of the inertia."""
+SURE_FREQUENCY, SURE_SHARE = 0.05, 0.03
+"""Half-widths at least: part of the frequency, which the spring's damping moves up by as much, and the motor's part of
+the inertia."""
 TOLD_FREQUENCY, TOLD_SHARE, MOST_SHARE = 0.25, 0.15, 0.9
 """Half-widths up to which they are told; the motor's part at most, above which a load moves next to nothing. Of 690
 logs of two other programs, 27 tell motor and load: 26 have a belt, of which 23 resonate within a tenth of what is
