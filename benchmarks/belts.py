@@ -153,14 +153,14 @@ def lines(results: list[dict[str, Any]]) -> Iterator[str]:
     told = [(r["belt"], r["train"]) for r in results if r.get("train")]
     for r in results:
         belt, train = r["belt"], r.get("train")
-        said = f"{train.frequency:5.1f} Hz, motor {train.motor_share:.2f}" if train else "not told"
+        said = f"{train.antiresonance:5.1f} Hz, motor {train.motor_share:.2f}" if train else "not told"
         kept = (
             "{:.1%} in [{:.1%}, {:.1%}]".format(r["reduction"], *r["promised"]) if "promised" in r else "none"
         )
         kept = r.get("refused", kept)[:60]
         yield f"{r['seed']:5d}: {belt.held:5.1f} Hz, motor {belt.share:.2f}: {said}; reduction {kept}"
     if told:
-        held = sum(t.frequency_interval[0] <= b.held <= t.frequency_interval[1] for b, t in told)
+        held = sum(t.antiresonance_interval[0] <= b.held <= t.antiresonance_interval[1] for b, t in told)
         part = sum(t.motor_share_interval[0] <= b.share <= t.motor_share_interval[1] for b, t in told)
         off = np.array([abs(t.resonance * math.sqrt(b.share) / b.held - 1.0) for b, t in told])
         yield (

@@ -40,12 +40,12 @@ def test_a_load_that_swings_behind_a_belt_does_not_count_as_more_inertia(frequen
     assert found.numbers["fc"].value == pytest.approx(0.2, rel=0.03)
     train, share = found.two_inertias, MOTOR / (MOTOR + LOAD)
     assert train is not None
-    assert train.frequency_interval[0] < frequency < train.frequency_interval[1]
-    assert train.frequency == pytest.approx(frequency, rel=0.1)
+    assert train.antiresonance_interval[0] < frequency < train.antiresonance_interval[1]
+    assert train.antiresonance == pytest.approx(frequency, rel=0.1)
     assert train.motor_share_interval[0] < share < train.motor_share_interval[1]
     assert train.motor_share == pytest.approx(share, abs=0.05)
     (said,) = on_swing(found)
-    assert f"resonate at {train.resonance:.3g} Hz" in said
+    assert f"resonance at {train.resonance:.3g} Hz" in said
 
 
 def test_a_filter_in_the_column_of_the_torque_does_not_count_as_less_inertia() -> None:
@@ -137,9 +137,9 @@ def test_motor_and_load_are_told_where_two_bands_say_the_same() -> None:
 
     train = two_inertias([told(held, 0.3), told(1.1 * held, 0.32), told(9.0 * held, 2.0)])
     assert train is not None
-    assert train.frequency_interval[0] < 11.0 / math.sqrt(1.1) < 11.0 < train.frequency_interval[1]
+    assert train.antiresonance_interval[0] < 11.0 / math.sqrt(1.1) < 11.0 < train.antiresonance_interval[1]
     assert train.motor_share == pytest.approx(0.31)
-    assert train.resonance == pytest.approx(train.frequency / math.sqrt(0.31))
+    assert train.resonance == pytest.approx(train.antiresonance / math.sqrt(0.31))
     for other in (told(2.0 * held, 0.3), told(held, 0.6), told(held, 1.2), told(-held, 0.3)):
         assert two_inertias([told(held, 0.3), other]) is None
     assert two_inertias([told(held, 0.3)]) is None

@@ -17,7 +17,7 @@ HEAD = 'format = "stickslip-model-1"\nlaw = "coulomb"\n'
 LAW = "[parameters]\nfc = 0.3\nsigma2 = 0.01\n"
 PENDULUM = "[axis]\ninertia = 4e-4\ngravity = 0.6\ngravity_angle = 0.4\n"
 BELT = (
-    "[drivetrain]\nload_frequency = 11.0\nload_frequency_interval = [10.0, 12.0]\nmotor_share = 0.25\n"
+    "[drivetrain]\nantiresonance = 11.0\nantiresonance_interval = [10.0, 12.0]\nmotor_share = 0.25\n"
     "motor_share_interval = [0.2, 0.3]\n"
 )
 
@@ -72,7 +72,7 @@ def test_it_is_shown_printed_and_run(
         (HEAD + LAW + "[axis]\ninertia = -1.0\n", "holds no inertia"),
         (HEAD + LAW + '[axis]\ninertia = "much"\n', "axis.inertia = 'much' must be a number"),
         (HEAD + LAW + PENDULUM + BELT.replace("0.25", "0.5"), r"motor_share = 0.5 \[0.2, 0.3\]"),
-        (HEAD + LAW + PENDULUM + "[drivetrain]\nload_frequency = 11.0\n", "its drivetrain lacks"),
+        (HEAD + LAW + PENDULUM + "[drivetrain]\nantiresonance = 11.0\n", "its drivetrain lacks"),
         (HEAD.replace("1", "9") + LAW + PENDULUM, "is of another version"),
     ],
 )

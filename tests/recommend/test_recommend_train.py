@@ -56,7 +56,7 @@ def test_the_result_is_a_machine_with_motor_and_load(told: ss.IdentificationResu
 def test_the_model_holds_motor_and_load(belt: Identified) -> None:
     train = belt.train
     assert train is not None
-    assert train.frequency_interval[0] < BELT < train.frequency_interval[1]
+    assert train.antiresonance_interval[0] < BELT < train.antiresonance_interval[1]
     assert train.motor_share_interval[0] < MOTOR / (MOTOR + LOAD) < train.motor_share_interval[1]
     assert train.from_dict(train.as_dict()) == train
     axis = train.axis(1e-3, 0.02)
@@ -70,7 +70,7 @@ def test_axes_are_drawn_with_motor_and_load_of_the_intervals(belt: Identified) -
     first, *drawn = plants_of(belt, MOTOR + LOAD, 20, 1)
     assert first.flexible is not None
     assert first.flexible.modes[1] == pytest.approx(belt.train.resonance, rel=1e-3)
-    (low, high), (least, most) = belt.train.frequency_interval, belt.train.motor_share_interval
+    (low, high), (least, most) = belt.train.antiresonance_interval, belt.train.motor_share_interval
     trains = [p.flexible for p in drawn if p.flexible is not None]
     held = [math.sqrt(f.elasticity / f.disk) / (2.0 * math.pi) for f in trains]
     assert len(held) == 20
@@ -113,13 +113,15 @@ def test_a_loop_that_the_belt_does_not_bear_gets_no_compensator(belt: Identified
 def test_a_comparison_says_whether_the_spring_has_changed(belt: Identified) -> None:
     train = belt.train
     assert train is not None
-    low, high = train.frequency_interval
-    slack = replace(train, frequency=0.8 * train.frequency, frequency_interval=(0.8 * low, 0.8 * high))
+    low, high = train.antiresonance_interval
+    slack = replace(
+        train, antiresonance=0.8 * train.antiresonance, antiresonance_interval=(0.8 * low, 0.8 * high)
+    )
     notes = ss.compare(belt, replace(belt, train=slack)).notes
-    (said,) = [note for note in notes if "motor held" in note]
+    (said,) = [note for note in notes if "antiresonance" in note]
     assert "-20 % [-27, -13]" in said
     assert "softer" in said
-    (same,) = [note for note in ss.compare(belt, belt).notes if "motor held" in note]
+    (same,) = [note for note in ss.compare(belt, belt).notes if "antiresonance" in note]
     assert "no change of the spring shows" in same
     (one,) = [note for note in ss.compare(replace(belt, train=None), belt).notes if "spring" in note]
     assert one.startswith("Only model.toml tells")
@@ -138,7 +140,7 @@ def test_a_damaged_drivetrain_is_named(tmp_path: Path, damage: str, said: str) -
     path = tmp_path / "m.toml"
     path.write_text(
         'law = "coulomb"\n[parameters]\nfc = 0.3\nsigma2 = 0.01\n[axis]\ninertia = 4e-4\n[drivetrain]\n'
-        "load_frequency = 11.0\nload_frequency_interval = [10.0, 12.0]\nmotor_share_interval = [0.2, 0.4]\n"
+        "antiresonance = 11.0\nantiresonance_interval = [10.0, 12.0]\nmotor_share_interval = [0.2, 0.4]\n"
         + damage
     )
     with pytest.raises(InputError, match=said) as caught:

@@ -94,7 +94,8 @@ def lines(machine: Machine) -> Iterator[str]:
     yield ""
     if machine.flexible:
         yield f"free modes: {', '.join(f'{mode:.4g}' for mode in machine.flexible.modes)} Hz"
-    yield f"stiffness of the contact at the encoder: {machine.visible_stiffness:.4g} N·m/rad"
+    if machine.visible_stiffness > 0.0:  # a law without springs has none
+        yield f"stiffness of the contact at the encoder: {machine.visible_stiffness:.4g} N·m/rad"
     yield from (f"- {note}" for note in machine.notes)
 
 

@@ -27,9 +27,9 @@ class TwoInertias:
 
     Attributes
     ----------
-    frequency : float
+    antiresonance : float
         At which the load swings while the motor is held, Hz.
-    frequency_interval : tuple of float
+    antiresonance_interval : tuple of float
         Of 95 %.
     motor_share : float
         The motor's part of the whole inertia.
@@ -42,13 +42,13 @@ class TwoInertias:
         If a number is outside what such an axis can have, or an interval does not hold its value.
     """
 
-    frequency: float
-    frequency_interval: tuple[float, float]
+    antiresonance: float
+    antiresonance_interval: tuple[float, float]
     motor_share: float
     motor_share_interval: tuple[float, float]
 
     def __post_init__(self) -> None:
-        for name, most in (("frequency", math.inf), ("motor_share", 1.0)):
+        for name, most in (("antiresonance", math.inf), ("motor_share", 1.0)):
             value, (low, high) = getattr(self, name), getattr(self, f"{name}_interval")
             if not 0.0 < low <= value <= high < most:
                 raise ParameterError(
@@ -59,13 +59,13 @@ class TwoInertias:
     @property
     def resonance(self) -> float:
         """At which motor and load swing against each other, Hz."""
-        return self.frequency / math.sqrt(self.motor_share)
+        return self.antiresonance / math.sqrt(self.motor_share)
 
     def axis(
         self,
         inertia: float,
         damping: float = USUAL_DAMPING,
-        frequency: float | None = None,
+        antiresonance: float | None = None,
         motor_share: float | None = None,
     ) -> FlexibleAxis:
         """The axis of this inertia with the encoder at the motor and friction at the load.
@@ -76,12 +76,17 @@ class TwoInertias:
             Of the whole, kg·m².
         damping : float
             Part of critical.
-        frequency, motor_share : float, optional
+        antiresonance, motor_share : float, optional
             Other numbers within the intervals.
+
+        Raises
+        ------
+        ParameterError
+            If the inertia is not greater than 0.
         """
         motor = inertia * (self.motor_share if motor_share is None else motor_share)
         load = inertia - motor
-        held = 2.0 * math.pi * (self.frequency if frequency is None else frequency)
+        held = 2.0 * math.pi * (self.antiresonance if antiresonance is None else antiresonance)
         half = 0.5 * motor
         return FlexibleAxis(
             half, half, load, coupling=0.5 * half * (2.0 * math.pi * RIGID) ** 2, elasticity=load * held**2,
@@ -91,7 +96,7 @@ class TwoInertias:
     def as_dict(self) -> dict[str, Any]:
         """Plain data for a file."""
         return {
-            "load_frequency": self.frequency, "load_frequency_interval": list(self.frequency_interval),
+            "antiresonance": self.antiresonance, "antiresonance_interval": list(self.antiresonance_interval),
             "motor_share": self.motor_share, "motor_share_interval": list(self.motor_share_interval),
         }  # fmt: skip
 
@@ -106,8 +111,8 @@ class TwoInertias:
         ParameterError
             As of the class.
         """
-        (low, high), (least, most) = (content[f"{n}_interval"] for n in ("load_frequency", "motor_share"))
+        (low, high), (least, most) = (content[f"{n}_interval"] for n in ("antiresonance", "motor_share"))
         return cls(
-            float(content["load_frequency"]), (float(low), float(high)),
+            float(content["antiresonance"]), (float(low), float(high)),
             float(content["motor_share"]), (float(least), float(most)),
         )  # fmt: skip

@@ -157,7 +157,7 @@ def _swinging(train: TwoInertias | None, inertia: float, rng: np.random.Generato
     if train is None:
         return None
     frequency, share = (
-        float(rng.uniform(*i)) for i in (train.frequency_interval, train.motor_share_interval)
+        float(rng.uniform(*i)) for i in (train.antiresonance_interval, train.motor_share_interval)
     )
     return train.axis(inertia, _between(rng, *DAMPED), frequency, share)
 

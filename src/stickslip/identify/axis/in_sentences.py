@@ -6,6 +6,7 @@ import math
 import statistics
 
 from stickslip.identify.axis.agreed import ALIGNED, KNOWN
+from stickslip.identify.regression.flexible import Swing
 from stickslip.identify.regression.regression import Regression
 from stickslip.identify.regression.together import bend_of
 from stickslip.machines.servo import ServoAxis
@@ -52,18 +53,17 @@ def on_swing(found: Regression | None) -> list[str]:
         return []
     swing = statistics.median(swings)
     if swing < 0.0:
-        frequency, told = 1.0 / (2.0 * math.pi * math.sqrt(-swing)), found.two_inertias
-        at, both = f"about {frequency:.2g} Hz", ""
+        told, at = found.two_inertias, f"at about {Swing(swing, 0.0, 0.0).antiresonance:.2g} Hz"
         if told is not None:
-            (low, high), (least, most) = told.frequency_interval, told.motor_share_interval
-            at = f"{told.frequency:.3g} Hz [{low:.3g}, {high:.3g}]"
-            both = (
-                f", the motor has {told.motor_share:.2g} [{least:.2g}, {most:.2g}] of the inertia, and both resonate "
-                f"at {told.resonance:.3g} Hz"
+            (low, high), (least, most) = told.antiresonance_interval, told.motor_share_interval
+            at = (
+                f"at {told.antiresonance:.3g} Hz [{low:.3g}, {high:.3g}] (antiresonance), resonance at "
+                f"{told.resonance:.3g} Hz, the motor has {told.motor_share:.2g} [{least:.2g}, {most:.2g}] of the "
+                "inertia"
             )
         return [
-            f"Motor and load do not move as one: with the motor held the load swings at {at}{both}; this is allowed "
-            "for, and the inertia is that of both."
+            f"Motor and load do not move as one: with the motor held the load swings {at}; this is allowed for, and "
+            "the inertia is that of both."
         ]
     return [
         f"The torque column lags as behind a filter of about {1e3 * math.sqrt(2.0 * swing):.2g} ms; this is allowed "

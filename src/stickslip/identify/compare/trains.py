@@ -11,7 +11,7 @@ from stickslip.machines.two_inertias import TwoInertias
 def on_trains(first: Identified, second: Identified) -> list[str]:
     """What both models say of a load behind a spring; nothing where neither tells one.
 
-    The load's swing with the motor held has the square root of the spring's stiffness, whatever the motor is.
+    The antiresonance goes with the square root of the spring's stiffness, whatever the motor is.
     """
     if first.train is None or second.train is None:
         return [
@@ -21,24 +21,24 @@ def on_trains(first: Identified, second: Identified) -> list[str]:
             if found.train is not None
         ]
     one, other = first.train, second.train
-    apart = other.frequency / one.frequency - 1.0
-    half = math.hypot(*(width_of(t) / t.frequency for t in (one, other)))
+    apart = other.antiresonance / one.antiresonance - 1.0
+    half = math.hypot(*(width_of(t) / t.antiresonance for t in (one, other)))
     by = f"{100.0 * apart:+.2g} % [{100.0 * (apart - half):+.2g}, {100.0 * (apart + half):+.2g}]"
     verdict = "no change of the spring shows"
     if abs(apart) > half:
         verdict = f"the spring has become {'stiffer' if apart > 0.0 else 'softer'}, or the load another"
     return [
-        f"With the motor held the load swings at {spoken(one)}, then at {spoken(other)} ({by}): {verdict}."
+        f"The antiresonance of motor and load is at {spoken(one)}, then at {spoken(other)} ({by}): {verdict}."
     ]
 
 
 def width_of(train: TwoInertias) -> float:
     """Half-width of the frequency's interval, Hz."""
-    low, high = train.frequency_interval
+    low, high = train.antiresonance_interval
     return 0.5 * (high - low)
 
 
 def spoken(train: TwoInertias) -> str:
     """The frequency with its interval."""
-    low, high = train.frequency_interval
-    return f"{train.frequency:.3g} Hz [{low:.3g}, {high:.3g}]"
+    low, high = train.antiresonance_interval
+    return f"{train.antiresonance:.3g} Hz [{low:.3g}, {high:.3g}]"

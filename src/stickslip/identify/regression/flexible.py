@@ -60,7 +60,7 @@ class Swing(NamedTuple):
     inertia: float
 
     @property
-    def frequency(self) -> float:
+    def antiresonance(self) -> float:
         """At which the load swings while the motor is held, Hz; nan where this is a lag of the torque's column."""
         return 1.0 / (2.0 * math.pi * math.sqrt(-self.torque)) if self.torque < 0.0 else math.nan
 
@@ -80,10 +80,10 @@ def two_inertias(swings: Sequence[Swing]) -> TwoInertias | None:
         return None
     first, second = swings[:2]
     frequency, share = (
-        0.5 * (first.frequency + second.frequency),
+        0.5 * (first.antiresonance + second.antiresonance),
         0.5 * (first.motor_share + second.motor_share),
     )
-    half = max(abs(first.frequency - second.frequency), SURE_FREQUENCY * frequency)
+    half = max(abs(first.antiresonance - second.antiresonance), SURE_FREQUENCY * frequency)
     most = max(abs(first.motor_share - second.motor_share), SURE_SHARE)
     if not (half <= TOLD_FREQUENCY * frequency and most <= TOLD_SHARE and most < share < MOST_SHARE - most):
         return None
