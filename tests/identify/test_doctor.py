@@ -70,6 +70,16 @@ def test_simulated_records_with_events_have_no_errors():
     assert len(diagnosis.record) == len(record)
 
 
+def test_an_axis_that_turns_round_at_the_end_of_a_revolution_has_no_spikes():
+    """Where it crosses zero and comes back at once, the counter jumps there and back."""
+    t = np.arange(0.0, 8.0, 1e-3)
+    v = 20.0 * np.sin(2.0 * np.pi * 0.3 * t)
+    torque = 0.2 * np.tanh(v / 0.05) + 1e-3 * np.gradient(v, t)
+    channels = {"position": (np.cumsum(v) * 1e-3) % (2.0 * np.pi), "motor_torque": torque}
+    said = examine(Record(t, channels, {"position": "rad", "motor_torque": "N·m"})).findings
+    assert [f.code for f in said] == ["position-wrap"]
+
+
 def test_what_only_follows_from_a_wrap_or_a_coarse_clock_is_not_said_beside_it():
     """The work of friction was negative for the jumps alone; a velocity did not fit the rows that were left."""
     t = np.arange(0.0, 8.0, 1e-3)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -21,6 +23,29 @@ NAMES = {
 @pytest.mark.parametrize(("name", "role"), NAMES.items(), ids=NAMES)
 def test_what_a_name_says(name, role):
     assert role_of(name).role == role
+
+
+UNITS = {
+    "torque_nm": "Nm", "motor_torque_mnm": "mNm", "TORQUE_NM": "Nm", "Torque [mnm]": "mNm", "force_kn": "kN",
+    "current_ma": "mA", "position_nm": "nm", "vel_rad_per_s": "rad/s", "velocityRpm": "rpm", "TimeMs": "ms",
+    "motorTorqueNm": "Nm", "actPosDeg": "deg", "speedRadPerSec": "rad/sec", "current_a": "", "torqueMin": "",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "unit"), UNITS.items(), ids=UNITS)
+def test_a_unit_in_a_name_of_one_case_is_the_units_of_such_a_quantity(name: str, unit: str) -> None:
+    """`torque_nm` was a torque in nanometres, and therefore none; milliamperes were taken as amperes."""
+    assert role_of(name).role
+    assert role_of(name).unit == unit
+
+
+def test_a_unit_of_one_case_is_taken_from_a_row_of_units_and_from_a_map(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{k},{k},{k}\n" for k in range(1, 10))
+    path.write_text(f"time,position,torque\nms,deg,MNM\n{rows}")
+    assert read(path)["motor_torque"][0] == pytest.approx(1e-3)
+    path.write_text(f"time_ms,position_deg,x7\n{rows}")
+    assert read(path, {"motor_torque": "x7:ncm"})["motor_torque"][0] == pytest.approx(1e-2)
 
 
 def test_a_measured_torque_goes_before_a_commanded_one(tmp_path):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from stickslip.errors import InputError, suggestion
 from stickslip.finding import Finding
 from stickslip.readers._names import ALIASES, KINDS, ROLES, Name, motor_force, role_of
-from stickslip.readers._units import parse_unit, spellings
+from stickslip.readers._units import in_its_case, may_be_unit, parse_unit, spellings
 from stickslip.readers.table_columns import Column, Table
 
 MAIN = ("time", "position", "velocity", "motor_torque")
@@ -169,6 +169,7 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
             f"{_as_said(role, text)}: the file has no column {name!r}; {suggestion(name, _names_of(table))}"
         )
     if unit:
+        unit = in_its_case(unit, KINDS[role]) or unit
         parsed = None if unit.lower() in AMBIGUOUS else parse_unit(unit)
         if parsed is None or parsed.kind not in KINDS[role]:
             what = "is not a unit that is known" if parsed is None else f"is a unit of {parsed.kind}"
@@ -188,7 +189,7 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
 
 def _unit_of(column: Column) -> str:
     """The unit that the file gives beside the name, where it is one."""
-    return column.unit if parse_unit(column.unit) else ""
+    return column.unit if may_be_unit(column.unit) else ""
 
 
 def _along_a_line(chosen: Mapping[str, Choice]) -> bool:
@@ -222,11 +223,9 @@ def _names_of(table: Table) -> list[str]:
 
 def _guessed(role: str, column: Column, name: Name) -> Choice:
     """A choice with the unit that the file or the name tells, if it suits the channel."""
-    unit, source = (column.unit, "file") if parse_unit(column.unit) else (name.unit, "name")
-    parsed = parse_unit(unit)
-    if parsed is None or parsed.kind not in KINDS[role]:
-        unit, source = "", "assumed"
-    return Choice(role, column.name, unit, source, name.side)
+    unit, source = (column.unit, "file") if may_be_unit(column.unit) else (name.unit, "name")
+    unit = in_its_case(unit, KINDS[role])
+    return Choice(role, column.name, unit, source if unit else "assumed", name.side)
 
 
 def _pick(

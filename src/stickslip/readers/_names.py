@@ -11,7 +11,7 @@ import re
 import unicodedata
 from dataclasses import dataclass
 
-from stickslip.readers._units import Unit, parse_unit
+from stickslip.readers._units import Unit, in_its_case, may_be_unit, parse_unit
 
 KINDS: dict[str, tuple[str, ...]] = {
     "time": ("time",),
@@ -164,7 +164,9 @@ _NO_SIGNAL = _words(
     counter enable enabled error_code flag gain id index limit mode state status valid
     """
 )
-_NO_TAIL = frozenset(["1", "c", "f", "h", "i", "in", "k", "kp", "lb", "m", "min", "p", "u", "x"])
+_NO_TAIL = frozenset(
+    ["1", "a", "c", "f", "h", "i", "in", "k", "kp", "lb", "m", "min", "n", "p", "u", "v", "x"]
+)
 """Units that are more often something else at the end of a name."""
 REFERENCED = {
     "position": "position_reference",
@@ -175,6 +177,9 @@ REFERENCED = {
 IN_BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]{1,24}?)\s*[\])>}]")
 AFTER_IN = re.compile(r"\s+in\s+(\S{1,12})\s*$|\s*[/,]\s*(\S{1,12})\s*$", re.IGNORECASE)
 CAMEL = re.compile(r"(?<=[a-zäöüß])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+PIECES = re.compile(r"[_\s]+")
+WORD_ENDS = re.compile(rf"{PIECES.pattern}|{CAMEL.pattern}")
+PER = re.compile(r"(?<=[A-Za-z])(?:_(?:per|PER)_(?=[A-Za-z])|Per(?=[A-Z]))")
 UMLAUTS = str.maketrans(
     {
         "ä": "ae",
@@ -227,6 +232,8 @@ def role_of(name: str, unit: str = "") -> Name:
     if not _NO_SIGNAL.isdisjoint(parts):
         return Name("", 0, stated, "", "")
     role, sure = _role(bare, parts)
+    if role:
+        stated = in_its_case(stated, KINDS[role]) or stated
     parsed = parse_unit(stated) if stated else None
     if not role and parsed is not None:
         role = _role_by_unit(parts, parsed)
@@ -273,14 +280,19 @@ def _pieces(name: str, unit: str) -> tuple[str, str, list[str], str]:
 
 
 def _without_tail(bare: str) -> tuple[str, str]:
-    """A unit written after the last underscore or blank: "q_deg", "omega_rad_s"."""
-    pieces = [p for p in re.split(r"[_\s]+", bare) if p]
-    for count, join in ((2, "/"), (1, "")):
-        tail = join.join(pieces[-count:])
-        if len(pieces) > count and tail not in _NO_TAIL and (unit := parse_unit(tail)) is not None:
+    """A unit written after the last underscore or blank, or as a last word: "q_deg", "omega_rad_s", "torqueNm"."""
+    bare = PER.sub("/", bare)
+    for cut, alone in ((PIECES, True), (WORD_ENDS, False)):
+        pieces = [p for p in cut.split(bare) if p]
+        for count, join in ((2, "/"), (1, "")):
+            tail = join.join(pieces[-count:])
+            tail = tail if alone else tail.lower()
+            if len(pieces) <= count or tail in _NO_TAIL or not may_be_unit(tail):
+                continue
             head = "_".join(pieces[:-count])
-            role = _role(head, words(head))[0]
-            if role in ("", "motor_torque") or unit.kind in KINDS[role]:
+            role, unit = _role(head, words(head))[0], parse_unit(tail)
+            # A last word may be one of the name's, where nothing else says what it is.
+            if (alone and unit and role in ("", "motor_torque")) or (role and in_its_case(tail, KINDS[role])):
                 return head, tail
     return bare, ""
 
@@ -288,9 +300,9 @@ def _without_tail(bare: str) -> tuple[str, str]:
 def _without_unit(name: str) -> tuple[str, str]:
     """The name without the unit in it, and the unit."""
     for match in reversed(list(IN_BRACKETS.finditer(name))):
-        if parse_unit(match[1]) is not None:
+        if may_be_unit(match[1]):
             return (name[: match.start()] + " " + name[match.end() :]).strip(), match[1]
-    if (match := AFTER_IN.search(name)) and parse_unit(match[1] or match[2]) is not None:
+    if (match := AFTER_IN.search(name)) and may_be_unit(match[1] or match[2]):
         return name[: match.start()].strip(), match[1] or match[2]
     return name.strip(), ""
 

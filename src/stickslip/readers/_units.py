@@ -103,6 +103,11 @@ TURNED_AROUND = {
     f"{a}N{b}m": Unit("torque", PREFIXES[a] * PREFIXES[b]) for a in PREFIXES for b in ("u", "m", "c", "k")
 }
 METRIC = {**EVERY, **TURNED_AROUND}
+CASELESS = {
+    written.lower(): written
+    for written in ("Nm", "mNm", "uNm", "kNm", "cNm", "Ncm", "Nmm", "mN", "kN", "mA", "uA", "mV", "kV")
+}
+"""Units as they are written, by what is left of them in a name or a header that has one case throughout."""
 RATES = {"angle": "angular velocity", "length": "velocity", "counts": "count rate"}
 SECOND_RATES = {"angle": "angular acceleration", "length": "acceleration"}
 NUMBER = re.compile(r"([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*\*?\s*(.+)")
@@ -126,6 +131,21 @@ def parse_unit(text: str) -> Unit | None:
         if inner is not None and 0.0 < scale < math.inf:
             found = replace(inner, factor=inner.factor * scale)
     return found
+
+
+def in_its_case(text: str, kinds: tuple[str, ...]) -> str:
+    """A unit of one of these kinds as it is written, whatever its case ("NM" of a torque, which is a nanometre of a
+    length), or empty."""
+    for written in (text, CASELESS.get(_normal(text).lower(), "")):
+        unit = parse_unit(written)
+        if unit is not None and unit.kind in kinds:
+            return written
+    return ""
+
+
+def may_be_unit(text: str) -> bool:
+    """Whether this is a unit, or one whose case is lost."""
+    return parse_unit(text) is not None or _normal(text).lower() in CASELESS
 
 
 def spellings(kinds: tuple[str, ...]) -> str:

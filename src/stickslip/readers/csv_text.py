@@ -16,7 +16,7 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers import _scope
 from stickslip.readers._cells import OF_DAY, cell, moment, over_midnight
-from stickslip.readers._units import parse_unit
+from stickslip.readers._units import may_be_unit
 from stickslip.readers.table_columns import Array, Column, Format, Table
 
 DIALECTS = (
@@ -290,7 +290,7 @@ def _all_units(row: Sequence[str]) -> bool:
     """Whether a row holds nothing but units (or signs for none), and at least one."""
     told = [_bare(c) for c in row]
     real = [c for c in told if c not in ("", "-", "1")]
-    return bool(real) and all(parse_unit(c) is not None for c in real)
+    return bool(real) and all(may_be_unit(c) for c in real)
 
 
 def _bare(text: str) -> str:

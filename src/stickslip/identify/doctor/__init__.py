@@ -58,7 +58,7 @@ CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
 CONSEQUENCES = {
     "position-wrap": (
         "torque-sign", "velocity-sign", "velocity-mismatch", "time-skew", "torque-timing", "gravity", "offset",
-        "change", "backlash", "less-than-a-revolution", "no-reversal",
+        "change", "backlash", "less-than-a-revolution", "no-reversal", "spikes",
     ),
     "torque-magnitude": (
         "torque-sign", "time-skew", "torque-timing", "gravity", "offset", "change", "backlash",
