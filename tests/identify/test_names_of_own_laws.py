@@ -103,6 +103,14 @@ def test_the_form_does_not_depend_on_the_numbers_of_the_example(tmp_path: Path) 
     assert not of_sliding_form(Model(law, fc=0.5, df=0.2, vs=0.3, sigma2=0.02), 0.1, 10.0)
 
 
+def test_a_contact_that_creeps_on_a_steep_slope_is_of_the_same_law() -> None:
+    """A slope fitted so flat that the slowest rows lie on it: level and fall of the rows above are still those."""
+    for slope in (3.5e4, 10.0, 1.0):
+        assert of_sliding_form(Model("stribeck", k=slope, fc=0.5, fs=0.7, vs=0.3, sigma2=0.02), 0.1, 10.0), (
+            slope
+        )
+
+
 def test_an_excess_that_is_called_fs_is_no_static_torque(
     tmp_path: Path, record: dict[str, np.ndarray]
 ) -> None:

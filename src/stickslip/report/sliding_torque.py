@@ -13,7 +13,6 @@ import numpy as np
 from stickslip.identify.estimate import Identification
 from stickslip.identify.fit.smooth import seen
 from stickslip.identify.monte_carlo import sliding_torque
-from stickslip.identify.regression.drifting import drift_torque
 from stickslip.identify.regression.force_error import model_torque
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
@@ -40,7 +39,7 @@ class Sliding:
     time, velocity, position : array, shape (n,)
         s, rad/s (m/s), rad (m).
     measured, model : array, shape (n,)
-        The torque that acted, less what friction's drift adds to it, and that of the model, N·m (N).
+        The torque that acted, less what friction's drift and a load's swing add to it, and that of the model, N·m (N).
     inertial : array, shape (n,)
         What of the model's accelerates and lifts: all but friction and the constant torque, N·m (N).
     record : array of int, shape (n,)
@@ -93,9 +92,8 @@ def sliding_of(found: Identification) -> Sliding | None:
         return None
     rows = regression.rows
     skew = regression.numbers["skew"].value
-    added = drift_torque(regression.numbers, rows)
-    drifts = np.split(added, np.cumsum([r.time.size for r in rows])[:-1])
-    parts = [part(r, d, skew, mechanics) for r, d in zip(rows, drifts, strict=True)]
+    beside = np.split(regression.beside_law, np.cumsum([r.time.size for r in rows])[:-1])
+    parts = [part(r, b, skew, mechanics) for r, b in zip(rows, beside, strict=True)]
     columns = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
     velocity = columns["velocity"]
     record = np.repeat(np.arange(len(parts)), [p["time"].size for p in parts])
@@ -117,8 +115,8 @@ def left_by_plain(regression: Regression, inverse: Any) -> float:
     return regression.left_by(inverse.numbers())
 
 
-def part(rows: SlidingRows, drift: Array, skew: float, mechanics: Mechanics) -> dict[str, Array]:
-    """What one record says, by the names of `Sliding`, without what friction's drift adds to its torque, N·m (N)."""
+def part(rows: SlidingRows, beside: Array, skew: float, mechanics: Mechanics) -> dict[str, Array]:
+    """What one record says, by the names of `Sliding`, without what no law and no rigid axis holds, N·m (N)."""
     step = max(1, math.ceil(rows.time.size / POINTS))
     some = slice(None, None, step)
     inertial = mechanics.inertia * rows.fixed[some, ACCELERATION]
@@ -126,7 +124,7 @@ def part(rows: SlidingRows, drift: Array, skew: float, mechanics: Mechanics) -> 
         inertial = inertial + mechanics.gravity * np.sin(rows.position[some] - mechanics.gravity_angle)
     return {
         "time": rows.time[some], "velocity": rows.speed[some], "position": rows.position[some],
-        "measured": (rows.torque(skew) - drift)[some], "inertial": inertial,
+        "measured": (rows.torque(skew) - beside)[some], "inertial": inertial,
     }  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from stickslip.binding import NEGATIVE
 from stickslip.identify.regression.regression import Regression
 from stickslip.model import Model
 from stickslip.simulation.prescribed.steady import Steady
-from stickslip.spec import Law
+from stickslip.spec import Elements, Law
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -34,9 +35,10 @@ ROUNDING = 1e-9
 def of_sliding_form(model: Model, slowest: float, fastest: float) -> bool:
     """Whether friction is ``sign(v) (fc + (fs - fc) exp(-|v / vs|^delta_s)) + sigma2 v`` between two speeds.
 
-    Certain sliding fits that curve there. A law of one's own whose ``fc`` is the level of another one (a fall as
-    1 / (1 + (v / vs)^2), a square of the velocity) has its numbers from the prediction error alone, as under any other
-    names. A law without ``fc``, or without a curve, is taken at its word.
+    Certain sliding fits that curve there. On a steep slope through zero, below it, a contact only creeps. A law of
+    one's own whose ``fc`` is the level of another one (a fall as 1 / (1 + (v / vs)^2), a square of the velocity) has
+    its numbers from the prediction error alone, as under any other names. A law without ``fc``, or without a curve, is
+    taken at its word.
 
     Parameters
     ----------
@@ -52,9 +54,17 @@ def of_sliding_form(model: Model, slowest: float, fastest: float) -> bool:
     steady = Steady(law, v, np.ones(v.size))
     for factors in ({}, OTHERWISE):
         q = p._replace(**{n: f * getattr(p, n) for n, f in factors.items() if hasattr(p, n)})
-        if not np.all(np.abs(steady.torque(np.array(law.pack(q))) - usual_curve(q, v)) <= ALIKE * abs(q.fc)):
+        usual = usual_curve(q, v)
+        apart = np.abs(steady.torque(np.array(law.pack(q))) - usual) > ALIKE * abs(q.fc)
+        if np.any(apart & (usual < slope_through_zero(law, q) * v)):
             return False
     return True
+
+
+def slope_through_zero(law: Law, p: Any) -> float:
+    """N·m·s/rad (N·s/m), with which a law lets a contact at rest creep, up to its curve; infinite where it does not."""
+    contact = law.modes(p) if law.modes else None
+    return contact.slope if isinstance(contact, Elements) else math.inf
 
 
 def usual_curve(p: Any, v: Array) -> Array:

@@ -80,7 +80,7 @@ class BandFit:
         The same over the RMS of the torque.
     rows, pieces : int
     swing : Swing
-        What the second derivatives of torque and acceleration say, where a load swings.
+        What the second derivatives of acceleration, and where a load swings of torque, say.
     bend : float
         Part of Fc by which friction rises with velocity in another form (`stickslip.identify.regression.bent`).
     flexible : float

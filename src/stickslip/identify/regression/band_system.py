@@ -319,10 +319,11 @@ class System:
         return torque[:, None] - self.columns @ coefficients
 
     def swing_of(self, c: Candidate) -> Swing:
-        """What a candidate says of a swing; `STILL` where no load swings."""
-        if self.train is not Train.SWINGS:
+        """What a candidate says of a swing, the torque's part 0 where the train gives; `STILL` where it is rigid."""
+        if self.train is Train.RIGID:
             return STILL
-        acceleration, torque = (float(c.small[i] / self.scale[self.small[i]]) for i in range(2))
+        found = [float(c.small[i] / self.scale[self.small[i]]) for i in range(self.train.value)]
+        acceleration, torque = (*found, 0.0)[:2]
         return Swing(torque, acceleration, float(c.values[INERTIA] / self.scale[INERTIA]))
 
     def weights(self, candidates: Sequence[Candidate]) -> Array:

@@ -108,6 +108,16 @@ def flexible_columns(records: Sequence[SlidingRows], inertia: float, train: Trai
     return columns, USUAL * np.array([inertia, 1.0])[: train.value]
 
 
+def train_torque(records: Sequence[SlidingRows], swing: Swing) -> Array:
+    """What a train that gives or swings adds to the torque of a rigid axis, N·m (N), shape (n,)."""
+    added = np.zeros(stacked(records, "speed").size)
+    if swing.acceleration:
+        added += swing.acceleration * stacked(records, "snap")
+    if swing.torque:
+        added += swing.torque * np.concatenate([torque_bent(r) for r in records])
+    return added
+
+
 def swings_alike(swings: Sequence[Swing]) -> bool:
     """Whether the torque's coefficients of a swing are about the same in the two widest bands."""
     first, second = (*(s.torque for s in swings), 0.0, 0.0)[:2]

@@ -28,7 +28,7 @@ from stickslip.identify.regression.creeping import NOWHERE, Creep
 from stickslip.identify.regression.drifted import calm_beside_drift
 from stickslip.identify.regression.drifting import DRIFTS, drift_torque
 from stickslip.identify.regression.falls import Falling, fall_of
-from stickslip.identify.regression.flexible import two_inertias
+from stickslip.identify.regression.flexible import train_torque, two_inertias
 from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.orders import without_waves
 from stickslip.identify.regression.rebuilding import rebuilt_within
@@ -166,11 +166,17 @@ class Regression:
         known = known + values.get("gravity_cos", 0.0) * np.cos(position)
         speed = stacked(self.rows, "speed")
         known = known + values.get("uneven", 0.0) * np.abs(speed)
-        known = known + drift_torque(self.numbers, self.rows)
+        known = known + self.beside_law
         if {"fs", "vs"} <= values.keys():
             left = Fall(values["vs"], self.exponent).at(speed)
             known = known + (values["fs"] - values["fc"]) * left * np.sign(speed)
         return np.asarray(torque - known, dtype=np.float64)
+
+    @property
+    def beside_law(self) -> Array:
+        """What no law and no rigid axis holds of the torque in the rows, N·m (N), shape (n,): friction's drift, and a
+        train that gives or swings."""
+        return drift_torque(self.numbers, self.rows) + train_torque(self.rows, self.bands[0].swing)
 
     def left_by(self, values: Mapping[str, float]) -> float:
         """RMS of `remainder`, N·m (N)."""
