@@ -16,6 +16,11 @@ NAMES = {
     "Momentistwert [%]": "motor_torque", "Motormoment": "motor_torque", "Schlittenposition [mm]": "position",
     "M_soll[Nm]": "motor_torque", "Temps (ms)": "time", "Couple réel (%)": "motor_torque",
     "Vitesse réelle (mm/s)": "velocity", "Tempo [s]": "time", "Posizione [mm]": "position",
+    "Spindelposition [mm]": "position", "Vorschubkraft (N)": "motor_torque", "Reibmoment [Nm]": "friction_torque",
+    "Droop pulses [pulse]": "position_error", "Cumulative feedback pulses [pulse]": "position",
+    "Feedback pulse counter[encoder pulse]": "position", "PL.FB (Counts16Bit)": "position",
+    "Torque actual [% In]": "motor_torque", "actual_qd_0": "velocity", "target_qd_0": "velocity_reference",
+    "I nominal [A]": "current_reference",
     "Velocità [giri/min]": "velocity", "Coppia [Nm]": "motor_torque", "Position réelle (mm)": "position",
 }  # fmt: skip
 
@@ -28,6 +33,7 @@ def test_what_a_name_says(name, role):
 UNITS = {
     "torque_nm": "Nm", "motor_torque_mnm": "mNm", "TORQUE_NM": "Nm", "Torque [mnm]": "mNm", "force_kn": "kN",
     "current_ma": "mA", "position_nm": "nm", "vel_rad_per_s": "rad/s", "velocityRpm": "rpm", "TimeMs": "ms",
+    "torque_Nm_filtered": "Nm", "pos_deg_act": "deg", "q_deg_2": "deg", "torque_act [% In]": "% In",
     "motorTorqueNm": "Nm", "actPosDeg": "deg", "speedRadPerSec": "rad/sec", "current_a": "", "torqueMin": "",
 }  # fmt: skip
 

@@ -12,6 +12,24 @@ import unicodedata
 from dataclasses import dataclass
 
 from stickslip.readers._units import Unit, in_its_case, may_be_unit, parse_unit
+from stickslip.readers._vocabulary import (
+    COMPOUNDS,
+    ERROR,
+    FORCE,
+    FORCE_SYMBOL,
+    LOAD_SIDE,
+    MOTOR_SIDE,
+    NO_SIGNAL,
+    NO_TAIL,
+    OF_REFERENCE,
+    OTHER_COMPOUNDS,
+    REFERENCED,
+    SECONDS,
+    SENSOR,
+    SKIP,
+    WHOLE,
+    WORDS,
+)
 
 KINDS: dict[str, tuple[str, ...]] = {
     "time": ("time",),
@@ -48,137 +66,12 @@ ALIASES = {
 """Short names accepted in a mapping."""
 
 
-def _table(text: str) -> dict[str, tuple[str, ...]]:
-    """A mapping from "key: word word ..." lines; indented lines go on."""
-    out: dict[str, tuple[str, ...]] = {}
-    key = ""
-    for word in text.split():
-        if word.endswith(":"):
-            key = word[:-1]
-            out[key] = ()
-        else:
-            out[key] += (word,)
-    return out
-
-
-def _words(text: str) -> frozenset[str]:
-    return frozenset(text.split())
-
-
-WORDS = _table(
-    """
-    time: time zeit timestamp zeitstempel datetime uhrzeit elapsed seconds clock stamp temps tempo tiempo
-    position: position positions pos angle winkel lage weg displacement deflection theta phi posn encoder enc
-        resolver lageist lagesoll stellung rotation stroke hub posist possoll istpos sollpos istposition
-        sollposition istlage solllage lageistwert lagesollwert actpos setpos lastposition qpos drehwinkel
-        motorposition ptpos schlittenposition achsposition achsenposition wagenposition positionsistwert
-        positionssollwert posizione posicion
-    velocity: velocity velocities vel velo speed geschwindigkeit drehzahl omega qvel nist nsoll vist vsoll
-        drehzahlistwert drehzahlsollwert istdrehzahl solldrehzahl actvelo setvelo istgeschwindigkeit
-        sollgeschwindigkeit geschw dtheta dphi rpm vitesse velocita velocidad
-        motordrehzahl
-    acceleration: acceleration acc accel beschleunigung ddtheta acceler
-    motor_torque: torque torques trq tau drehmoment moment effort kraft force istmoment sollmoment
-        momentenistwert drehmomentistwert torqueforce tq thrust mist motorkraft antriebskraft istkraft
-        sollkraft momentistwert momentsollwert motormoment motordrehmoment
-        antriebsmoment couple coppia
-    friction_torque: friction reibung reibmoment reibkraft reibungsmoment reibungskraft
-    current: current currents strom iq amps iqist stromistwert iststrom motorstrom cur amperage courant
-        corrente corriente
-    voltage: voltage volts spannung volt uq motorspannung vir
-    supply: supply vbus vdc udc ubat vbat battery dclink vsupply versorgung versorgungsspannung zwischenkreis
-        zwischenkreisspannung
-    load: normal normalforce normalkraft preload vorspannung fn load last
-    temperature: temperature temp temperatur motortemp tmp
-    position_error: schleppfehler schleppabstand followingerror lag poserror posdiff regelabweichung
-    """
-)
-"""Words that name a quantity."""
-
-WHOLE = _table(
-    """
-    time: t ts secs s sec tout ms msec millis
-    position: q qm q_m x y th 6064 607a_actual pl.fb s-0-0051 s-0-0053 px x_m qmes q_act pos_estimate
-        encoder.pos_estimate p_act r2521 phi_m theta_m theta_l q_l q_meas
-    velocity: v w dq qd_m dqm dx qdot n 606c vl.fb s-0-0040 vx vel_estimate r0061 r61 r0063 r63 dq_act v_act
-        n_act omega_m w_m v_m thetadot q_dot theta_dot
-    motor_torque: tq te t_m tm tau_m 6077 s-0-0084 r0080 r80 m_act m_motor u_tau tau_act
-    friction_torque: tf t_f ff f_f tau_f m_r mr
-    sensor_torque: sensor_torque torque_sensor
-    current: i i_q iq_measured iq_act 6078 il.fb r0078 r78 i_act im i_m ia
-    voltage: u vm u_q u_m v_motor ua
-    supply: input_volts input_voltage vin v_in vbus v_bus u_bus bus_voltage udc u_dc vdc v_dc u_zk ubat vbat 6079
-    acceleration: a ddq qddot ddx a_act
-    temperature: r0035 r35
-    position_reference: qg q_d qd qr q_r q_ref q_des xd x_d 607a 6062 pl.cmd s-0-0047 input_pos r ref w_pos
-        setpoint sollwert command goal reference theta_d thetad
-    velocity_reference: 60ff 606b vl.cmd s-0-0036 input_vel r0062 r62 dqd dq_d v_d w_d
-    current_reference: iq_setpoint il.cmd r0077
-    position_error: 60f4 e pl.err s-0-0189 error position_error
-    compensation_torque: 60b2 compensation_torque torque_offset
-    """
-)
-"""Whole names (or their last part) that name a quantity."""
-
-OF_REFERENCE = _words(
-    """
-    cmd command commanded demand demanded des desired drehzahlsollwert fuehrungsgroesse goal input
-    lagesoll lagesollwert nsoll planned possoll ref reference set setpoint setpos setvelo soll
-    solldrehzahl sollgeschwindigkeit sollkraft solllage sollmoment sollpos sollposition sollwert target trajectory
-    vorgabe vsoll ziel consigne momentsollwert positionssollwert riferimento
-    """
-)
-"""Words that say that a quantity is a reference, not measured."""
-
-SECONDS = frozenset(["sec", "secs", "ms", "msec", "millis"])
-"""Names of a time that are its unit. A bare "s" may as well be a displacement (and does not beat a "t")."""
-ERROR = frozenset(["deviation", "diff", "err", "error", "fehler", "following", "lag"])
-LOAD_SIDE = frozenset(
-    [
-        "abtrieb",
-        "arm",
-        "last",
-        "lastposition",
-        "lastseitig",
-        "link",
-        "load",
-        "loadside",
-        "lside",
-        "output",
-        "side2",
-    ]
-)
-FORCE = frozenset(["force", "kraft"])
-SENSOR = frozenset(["sensor", "kraftsensor", "kraftaufnehmer"])
-FORCE_SYMBOL = frozenset(["f", "fm", "fmot", "fmotor"])
-"""The force's symbol: a frequency, a friction and a normal force have it too."""
-MOTOR_SIDE = frozenset(["antrieb", "drive", "mot", "motor", "motorseitig", "rotor"])
-SKIP = _words(
-    """
-    achse act actual axes axis estimate fb feedback filtered internal ist istwert joint meas measured mes
-    present raw value attuale mesure mesuree reale reel reelle
-    """
-)
-_NO_SIGNAL = _words(
-    """
-    counter enable enabled error_code flag gain id index limit mode state status valid
-    """
-)
-_NO_TAIL = frozenset(
-    ["1", "a", "c", "f", "h", "i", "in", "k", "kp", "lb", "m", "min", "n", "p", "u", "v", "x"]
-)
-"""Units that are more often something else at the end of a name."""
-REFERENCED = {
-    "position": "position_reference",
-    "velocity": "velocity_reference",
-    "current": "current_reference",
-}
-
 IN_BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]{1,24}?)\s*[\])>}]")
 AFTER_IN = re.compile(r"\s+in\s+(\S{1,12})\s*$|\s*[/,]\s*(\S{1,12})\s*$", re.IGNORECASE)
 CAMEL = re.compile(r"(?<=[a-zäöüß])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 PIECES = re.compile(r"[_\s]+")
 WORD_ENDS = re.compile(rf"{PIECES.pattern}|{CAMEL.pattern}")
+NUMBERED = re.compile(r"\d{1,2}")
 PER = re.compile(r"(?<=[A-Za-z])(?:_(?:per|PER)_(?=[A-Za-z])|Per(?=[A-Z]))")
 UMLAUTS = str.maketrans(
     {
@@ -229,7 +122,7 @@ def words(name: str) -> list[str]:
 def role_of(name: str, unit: str = "") -> Name:
     """Read a column's name; `unit` is the unit that the file gives besides."""
     bare, stated, parts, axis = _pieces(name, unit)
-    if not _NO_SIGNAL.isdisjoint(parts):
+    if not NO_SIGNAL.isdisjoint(parts) and not _whole(bare):
         return Name("", 0, stated, "", "")
     role, sure = _role(bare, parts)
     if role:
@@ -280,16 +173,21 @@ def _pieces(name: str, unit: str) -> tuple[str, str, list[str], str]:
 
 
 def _without_tail(bare: str) -> tuple[str, str]:
-    """A unit written after the last underscore or blank, or as a last word: "q_deg", "omega_rad_s", "torqueNm"."""
+    """A unit after the last underscore or blank, as a last word, or before what was done with the quantity: "q_deg",
+    "omega_rad_s", "torqueNm", "torque_Nm_filtered", "pos_deg_2"."""
     bare = PER.sub("/", bare)
     for cut, alone in ((PIECES, True), (WORD_ENDS, False)):
-        pieces = [p for p in cut.split(bare) if p]
+        pieces, behind = [p for p in cut.split(bare) if p], list[str]()
+        while len(pieces) > 2 and (
+            pieces[-1].lower() in SKIP | OF_REFERENCE or NUMBERED.fullmatch(pieces[-1])
+        ):
+            behind.insert(0, pieces.pop())
         for count, join in ((2, "/"), (1, "")):
             tail = join.join(pieces[-count:])
             tail = tail if alone else tail.lower()
-            if len(pieces) <= count or tail in _NO_TAIL or not may_be_unit(tail):
+            if len(pieces) <= count or tail in NO_TAIL or not may_be_unit(tail):
                 continue
-            head = "_".join(pieces[:-count])
+            head = "_".join([*pieces[:-count], *behind])
             role, unit = _role(head, words(head))[0], parse_unit(tail)
             # A last word may be one of the name's, where nothing else says what it is.
             if (alone and unit and role in ("", "motor_torque")) or (role and in_its_case(tail, KINDS[role])):
@@ -304,7 +202,8 @@ def _without_unit(name: str) -> tuple[str, str]:
             return (name[: match.start()] + " " + name[match.end() :]).strip(), match[1]
     if (match := AFTER_IN.search(name)) and may_be_unit(match[1] or match[2]):
         return name[: match.start()].strip(), match[1] or match[2]
-    return name.strip(), ""
+    beside = IN_BRACKETS.sub("", name).strip()
+    return (beside if _whole(beside) else name.strip()), ""
 
 
 def _whole(bare: str) -> str:
@@ -358,6 +257,9 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
             if w not in SKIP and w not in OF_REFERENCE and w not in LOAD_SIDE and w not in MOTOR_SIDE
         ]
         role = _whole(rest[0]) if len(rest) == 1 else ""
+        if rest == ["qd"] and len(parts) > 1:
+            role = "velocity"  # "actual_qd", "qd_ref": the rate of q; alone it may be a desired q
+        role = role or _compound(parts)
         if not role:
             return "", 0
         found = [role]
@@ -369,12 +271,21 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
     return role, 1
 
 
+def _compound(parts: list[str]) -> str:
+    """What a German compound ends in: "Spindelposition", "Vorschubkraft"; empty for a load's, friction's or none."""
+    for word in parts:
+        for end, role in COMPOUNDS.items():
+            if word.endswith(end) and not word.startswith(OTHER_COMPOUNDS):
+                return role
+    return ""
+
+
 def _role_by_unit(parts: list[str], unit: Unit) -> str:
     """What an unknown name with a telling unit must be; empty where the unit tells too little."""
     if not OF_REFERENCE.isdisjoint(parts):
         return "motor_torque" if unit.kind == "torque" else ""
     return {"angular velocity": "velocity", "torque": "motor_torque", "current": "current", "voltage": "voltage",
-            "temperature": "temperature", "angle": "position"}.get(unit.kind, "")  # fmt: skip
+            "temperature": "temperature", "angle": "position", "counts": "position"}.get(unit.kind, "")  # fmt: skip
 
 
 def _side(parts: list[str], role: str) -> str:

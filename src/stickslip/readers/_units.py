@@ -43,7 +43,8 @@ PLAIN: dict[str, Unit] = {
     # Counts of an encoder
     **dict.fromkeys(
         ("counts", "count", "cnt", "cnts", "cts", "inc", "incs", "incr", "increment", "increments", "ink", "inkr",
-         "inkremente", "tick", "ticks", "pulse", "pulses", "puls", "pulse_unit", "lsb", "digit", "digits"),
+         "inkremente", "tick", "ticks", "pulse", "pulses", "puls", "pulse_unit", "encoderpulse", "encoderpulses", "lsb",
+         "digit", "digits"),
         Unit("counts"),
     ),
     # Speeds that are no quotient
@@ -110,6 +111,8 @@ CASELESS = {
 """Units as they are written, by what is left of them in a name or a header that has one case throughout."""
 RATES = {"angle": "angular velocity", "length": "velocity", "counts": "count rate"}
 SECOND_RATES = {"angle": "angular acceleration", "length": "acceleration"}
+OF_SOMETHING = re.compile(r"%[A-Za-z_]{1,24}")
+"""A share of what is rated: "% In", "% of rated torque"."""
 NUMBER = re.compile(r"([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*\*?\s*(.+)")
 
 
@@ -185,7 +188,7 @@ def _plain(text: str) -> Unit | None:
             return PLAIN[candidate]
         if (quotient := _quotient(candidate)) is not None:
             return quotient
-    return None
+    return PLAIN["%"] if OF_SOMETHING.fullmatch(text) else None
 
 
 def _quotient(text: str) -> Unit | None:
