@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError
 from stickslip.readers import Drive, read
@@ -78,6 +79,32 @@ def test_a_share_of_the_rated_torque_of_a_screw_drive(tmp_path):
     path = written(tmp_path / "log.csv", "time [s],position [mm],torque [%]", 1e3 * Q, 100.0 * TORQUE)
     record = read(path, drive=Drive(rated_torque=3.0, lead=LEAD))
     assert record["motor_torque"] == pytest.approx(3.0 * TORQUE * 2.0 * math.pi / LEAD)
+
+
+def test_a_share_of_a_rated_torque_beside_millimetres_asks_for_the_lead(tmp_path, capsys):
+    """It was taken in newtons: 0.31 kg for 395, identified, without a word."""
+    path = written(tmp_path / "log.csv", "time [s],position [mm],torque [%]", 1e3 * Q, 100.0 * TORQUE)
+    assert main(["doctor", str(path), "--rated-torque", "3"]) == 2
+    said = capsys.readouterr().out
+    assert "mixed-units" in said
+    assert "--lead MM" in said
+    assert "--map 'motor_torque=torque [%]:0.03N'" in said
+    force = read(path, {"motor_torque": "torque [%]:0.03N"})
+    assert force["motor_torque"] == pytest.approx(3.0 * TORQUE)
+    assert force.units["motor_torque"] == "N"
+
+
+def test_a_rated_torque_that_no_unit_asks_for_is_not_passed_over(tmp_path):
+    """Percents without a unit were taken as N·m beside --rated-torque: every number 42 times too large."""
+    path = written(tmp_path / "log.csv", "time [s],position [rad],torque", Q, 100.0 * TORQUE)
+    (found,) = ss.doctor(path, rated_torque=3.0).errors
+    assert found.code == "torque-unit"
+    assert "--map motor_torque=torque:percent (or permille)" in found.remedy
+    stated = written(tmp_path / "nm.csv", "time [s],position [rad],torque [Nm]", Q, TORQUE)
+    found = ss.doctor(stated, rated_torque=3.0, lead=LEAD)
+    assert {"rated-torque", "lead"} <= {f.code for f in found.findings}
+    assert not found.errors
+    assert not [f for f in ss.doctor(stated).findings if f.code in ("rated-torque", "lead")]
 
 
 def test_a_lead_in_millimetres_where_metres_are_asked_is_refused():

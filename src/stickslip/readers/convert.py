@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -140,7 +140,7 @@ def convert(
             _entry(choice, target) | {"factor": scale, "side": choice.side or "motor", "steps": steps}
         )
     said += _one_kind(channels, units, listed, drive)
-    said += _idle_gear(listed, drive)
+    said += [*_idle_gear(listed, drive), *_idle_rating(listed, drive)]
     derived, more = _torque_from_current(channels, units, drive, linear)
     reading = _reading(table, listed, drive, origin, [*said, *more])
     return Record(time, channels, units, {"reading": reading, "derived": derived})
@@ -215,7 +215,7 @@ def _scale(choice: Choice, unit: Unit, drive: Drive, linear: bool) -> tuple[floa
         steps.append(f"2π / {per_rev:g} counts")
     elif kind == "share" and choice.role in ("motor_torque", "compensation_torque"):
         rated = _needed(drive.rated_torque, choice, "a share of the rated torque", "--rated-torque")
-        factor, kind = factor * rated, "force" if linear and math.isnan(drive.lead) else "torque"
+        factor, kind = factor * rated, "torque"
         steps.append(f"rated torque {rated:g}")
     elif kind == "share" and choice.role in ("current", "current_reference"):
         rated = _needed(drive.rated_current, choice, "a share of the rated current", "--rated-current")
@@ -260,9 +260,15 @@ def _one_kind(
             "give --lead MM, what the axis moves for one revolution (a screw's lead, a pulley's circumference), and "
             "--gear-ratio N where a gear lies between"
         )
+        rated = [e for e in listed if e["channel"] == "motor_torque" and _steps_of(e, "rated torque")]
+        for entry in rated:
+            unit = f"{entry['column']}:{entry['factor']:g}N"
+            remedy += (
+                f"; of a linear motor's rated force, instead of --rated-torque, --map 'motor_torque={unit}'"
+            )
         return [Finding(level, "mixed-units", message, remedy=remedy)]
     # What turns is on the motor's side, unless its gear has been allowed for.
-    geared = any("gear ratio" in step for entry in listed for step in entry.get("steps", []))
+    geared = any(_steps_of(entry, "gear ratio") for entry in listed)
     way = drive.lead / (1.0 if geared else _ratio_or_one(drive)) / (2.0 * math.pi)
     for entry in listed:
         channel = entry["channel"]
@@ -273,6 +279,32 @@ def _one_kind(
             entry["factor"] *= factor
             entry["steps"].append(f"{2e3 * math.pi * way:g} mm a revolution")
     return []
+
+
+def _steps_of(entry: Mapping[str, Any], word: str) -> bool:
+    """Whether a step by which a column was converted says this."""
+    return any(word in step for step in entry.get("steps", ()))
+
+
+def _idle_rating(listed: Sequence[dict[str, Any]], drive: Drive) -> list[Finding]:
+    """That a rated torque, a rated current or a lead converts nothing; of a share that states no unit the doctor
+    speaks."""
+    out: list[Finding] = []
+    ratings = (("motor_torque", drive.rated_torque, "torque"), ("current", drive.rated_current, "current"))
+    for channel, value, what in ratings:
+        quiet = any(e["channel"] == channel and e["source"] == "assumed" for e in listed)
+        if not (math.isnan(value) or quiet or any(_steps_of(e, f"rated {what}") for e in listed)):
+            message = f"rated {what} {value:g} converts nothing: no column is a share of it"
+            out.append(Finding("note", f"rated-{what}", message))
+    by_current = "motor_torque" not in {e["channel"] for e in listed} and not math.isnan(
+        drive.torque_constant
+    )
+    if not (math.isnan(drive.lead) or by_current or any(_steps_of(e, "mm a revolution") for e in listed)):
+        message = (
+            f"lead {1e3 * drive.lead:g} mm converts nothing: no column turns while another moves along a line"
+        )
+        out.append(Finding("note", "lead", message))
+    return out
 
 
 def _idle_gear(listed: Sequence[dict[str, Any]], drive: Drive) -> list[Finding]:

@@ -250,9 +250,10 @@ def too_fast(view: View) -> Iterator[Finding]:
 
 
 def torque_scale(view: View) -> Iterator[Finding]:
-    """Whole numbers or tenths of percent where a torque is expected."""
+    """Whole numbers or tenths of percent where a torque is expected, or a rated torque of which a share is."""
     if not view.has("motor_torque") or view.stated("motor_torque") or "motor_torque" not in view.columns:
         return
+    asked = f"{_more(view, 'rated_torque', 'TORQUE')}, or {view.mapped('motor_torque', view.effort)} if it is right"
     values = view.values("motor_torque")
     peak = float(np.max(np.abs(values), initial=0.0))
     tenths = peak <= 500.0 and _whole(10.0 * values)
@@ -267,11 +268,12 @@ def torque_scale(view: View) -> Iterator[Finding]:
             "error",
             "torque-unit",
             message,
-            remedy=(
-                f"say {view.mapped('motor_torque', unit)}{_more(view, 'rated_torque', 'TORQUE')}, or"
-                f" {view.mapped('motor_torque', view.effort)} if it is right"
-            ),
+            remedy=f"say {view.mapped('motor_torque', unit)}{asked}",
         )
+    elif not _more(view, "rated_torque", "TORQUE"):
+        message = f"a rated torque is given, and {view.name('motor_torque')!r}, which states no unit, is no share of it"
+        remedy = f"say {view.mapped('motor_torque', 'percent')} (or permille){asked}"
+        yield Finding("error", "torque-unit", message, remedy=remedy)
 
 
 def _whole(values: Array) -> bool:
