@@ -35,7 +35,8 @@ THOUSANDS = {
     ",": re.compile(r"([-+]?\d{1,3}(?:[.'\u00a0\u202f]\d{3})+),(\d*)"),
 }
 """Numbers with signs between the thousands, by the decimal sign."""
-OF_DAY = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
+OF_DAY = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d)(?:[.,](\d+)|[;:](\d{1,3}))?")
+"""Hours, minutes, seconds; a fraction of these, or milliseconds apart (Studio 5000: ``10:15:22;122``)."""
 DAY = 86400.0
 
 
@@ -63,7 +64,8 @@ def cell(text: str, decimal: str) -> float | None:
 def moment(word: str) -> float | None:
     """A date with time, as s since 1970; a time of day, as s since midnight."""
     if (match := OF_DAY.fullmatch(word)) is not None:
-        return 3600.0 * int(match[1]) + 60.0 * int(match[2]) + float(match[3].replace(",", "."))
+        seconds = float(f"{match[3]}.{match[4] or 0}") + 1e-3 * int(match[5] or 0)
+        return 3600.0 * int(match[1]) + 60.0 * int(match[2]) + seconds
     if len(word) < 16 or not word[:4].isdigit():
         return None
     try:

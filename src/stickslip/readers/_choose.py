@@ -165,9 +165,7 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
         name, unit = (part.strip() for part in text.rsplit(":", 1))
     column = _find(table, name)
     if column is None:
-        raise InputError(
-            f"{_as_said(role, text)}: the file has no column {name!r}; {suggestion(name, _names_of(table))}"
-        )
+        raise InputError(f"{_as_said(role, text)}: {_absent(table, name)}")
     if unit:
         unit = in_its_case(unit, KINDS[role]) or unit
         parsed = None if unit.lower() in AMBIGUOUS else parse_unit(unit)
@@ -185,6 +183,18 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
     read = role_of(column.name, _unit_of(column))
     guess = _guessed(role, column, read)
     return Choice(role, column.name, guess.unit, guess.source, side or guess.side)
+
+
+def _absent(table: Table, name: str) -> str:
+    """That a column is not in the file, or holds nothing that can be read."""
+    unread = next((n for n in table.unread if n.lower() == name.lower()), None)
+    if unread is None:
+        return f"the file has no column {name!r}; {suggestion(name, _names_of(table))}"
+    held = f", first {table.unread[unread]!r}" if table.unread[unread] else ""
+    return (
+        f"column {unread!r} holds neither numbers nor a clock that can be read{held}; "
+        f"{suggestion('', _names_of(table))}"
+    )
 
 
 def _unit_of(column: Column) -> str:

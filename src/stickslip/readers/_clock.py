@@ -10,6 +10,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers._choose import Choice
+from stickslip.readers._stated_period import stated_period
 from stickslip.readers._units import parse_unit
 from stickslip.readers.table_columns import Array, Column, Table
 
@@ -99,8 +100,17 @@ def time_of(
             "such as --map time=COLUMN:s --map position=COLUMN:deg"
         )
     raise InputError(
-        f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give --sample-time SECONDS"
+        f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give "
+        f"{_by_header(table)}"
     )
+
+
+def _by_header(table: Table) -> str:
+    """The option that says the period, with the one that the header states."""
+    if (found := stated_period(table.constants)) is None:
+        return "--sample-time SECONDS"
+    name, text, period = found
+    return f"--sample-time {period:.6g}, as the header says ({name}: {text})"
 
 
 def times_of(table: Table, choices: Sequence[Choice], sample_time: float | None) -> tuple[Array, float]:

@@ -26,6 +26,7 @@ class _Layout:
         self.columns: list[Column] = []
         self.constants: dict[str, float | str] = {}
         self.findings: list[Finding] = []
+        self.unread: dict[str, str] = {}
 
     def walk(self, name: str, value: Any, depth: int = 0) -> None:
         """Lay out one value under a name."""
@@ -79,6 +80,7 @@ class _Layout:
         numbers = as_numbers(value)
         if numbers is None:
             self._skipped(name, "holds no numbers")
+            self.unread[name] = str(value[0])[:30]
         else:
             self._array(name, numbers, depth)
 
@@ -97,7 +99,9 @@ class _Layout:
         keys = dict.fromkeys(key for sample in flat for key in sample)
         for key in keys:
             values = [as_number(sample.get(key)) for sample in flat]
-            if all(math.isnan(v) for v in values) and any(isinstance(s.get(key), str) for s in flat):
+            words = [s[key] for s in flat if isinstance(s.get(key), str)]
+            if all(math.isnan(v) for v in values) and words:
+                self.unread[key] = words[0][:30]
                 continue
             # The list's own name says nothing about a signal.
             self.columns.append(Column(key, np.array(values)))
@@ -116,6 +120,7 @@ class _Layout:
                 self.constants[name] = str(value.ravel()[0])
             else:
                 self._skipped(name, f"holds {value.dtype}, not numbers")
+                self.unread[name] = str(value.ravel()[0])[:30] if value.size else ""
             return
         numbers = np.squeeze(numbers)
         if numbers.ndim == 0:
@@ -149,7 +154,8 @@ def table_of(format_name: str, tree: Any, name: str = "", findings: Sequence[Fin
     """
     layout = _Layout()
     layout.walk(name, tree)
-    return Table(format_name, _with_clocks(layout.columns), layout.constants, (*findings, *layout.findings))
+    said = (*findings, *layout.findings)
+    return Table(format_name, _with_clocks(layout.columns), layout.constants, said, layout.unread)
 
 
 def _with_clocks(columns: list[Column]) -> tuple[Column, ...]:

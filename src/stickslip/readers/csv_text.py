@@ -16,6 +16,7 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers import _scope
 from stickslip.readers._cells import OF_DAY, cell, moment, over_midnight
+from stickslip.readers._stated_period import is_period
 from stickslip.readers._units import may_be_unit
 from stickslip.readers.table_columns import Array, Column, Format, Table
 
@@ -70,11 +71,13 @@ def read(path: Path) -> Table:
     """Every column of a text table."""
     lines = _decode(path).splitlines()
     dialect = _sniff(path, lines)
-    header = [dialect.split(COMMENT.sub("", line)) for line in lines[: dialect.start] if line.strip()]
+    above = [line for line in lines[: dialect.start] if line.strip()]
+    header = [dialect.split(COMMENT.sub("", line)) for line in above]
     body = [line for line in lines[dialect.start :] if line.strip()]
-    body, findings = _without_footer(body, dialect)
+    body, findings = _without_headers(body, above, dialect)
+    body, footer = _without_footer(body, dialect)
     values, odd = _values(body, dialect, dialect.start)
-    findings += odd
+    findings += [*footer, *odd]
     if (groups := _scope.groups(header, dialect.width)) is not None:
         # The groups of slower channels end earlier.
         findings = [f for f in findings if f.code != "short-row"]
@@ -92,14 +95,19 @@ def read(path: Path) -> Table:
         for i, (name, unit) in enumerate(zip(names[: values.shape[1]], units, strict=False))
         if i not in dialect.words
     )
-    if dialect.words and body:
-        first = dialect.split(body[0])
-        left = ", ".join(
-            f"{names[i] or f'column {i + 1}'!r} (first {first[i].strip()[:30]!r})"
-            for i in sorted(dialect.words)
-        )
+    unread = _unread(names, body, dialect)
+    if unread:
+        left = ", ".join(f"{name!r} (first {first!r})" for name, first in unread.items())
         findings.append(Finding("note", "words", f"left out as they hold words, not numbers: {left}"))
-    return Table("csv", columns, _constants(header, dialect), tuple(findings))
+    return Table("csv", columns, _constants(header, dialect), tuple(findings), unread)
+
+
+def _unread(names: Sequence[str], body: Sequence[str], dialect: Dialect) -> dict[str, str]:
+    """Name and first cell of the columns that hold words."""
+    first = dialect.split(body[0]) if body else []
+    return {
+        names[i] or f"column {i + 1}": first[i].strip()[:30] for i in sorted(dialect.words) if i < len(first)
+    }
 
 
 # ---- bytes to lines -----------------------------------------------------------------------------------------
@@ -188,6 +196,25 @@ def _is_row(cells: Sequence[str], decimal: str) -> bool:
             return False
         numbers += not math.isnan(value)
     return numbers > 0 and numbers >= 0.5 * len(cells)
+
+
+def _without_headers(
+    body: list[str], above: Sequence[str], dialect: Dialect
+) -> tuple[list[str], list[Finding]]:
+    """The rows without the lines of the header that stand again among them, as in files that were put together."""
+    # Empty cells and signs for none above the first number are samples: without a clock their number counts.
+    known = {
+        line.strip() for line in above if None in [cell(c, dialect.decimal) for c in dialect.split(line)]
+    }
+    again = [i for i, line in enumerate(body) if line.strip() in known]
+    if not again:
+        return body, []
+    often = "once" if len(again) == 1 else f"{len(again)} times"
+    said = (
+        f"a line of the header stands again among the rows, {often}; it was left out: {body[again[0]][:40]!r}"
+    )
+    kept = [line for line in body if line.strip() not in known]
+    return kept, [Finding("note", "repeated-header", said, f"before row {again[0] + 1}")]
 
 
 def _without_footer(body: list[str], dialect: Dialect) -> tuple[list[str], list[Finding]]:
@@ -319,6 +346,8 @@ def _constants(header: Sequence[Sequence[str]], dialect: Dialect) -> dict[str, f
             key, value = re.split(r"[:=]", cells[0], maxsplit=1)
         elif len(cells) == 2 and dialect.width != 2:
             key, value = cells
+        elif len(cells) == 3 and is_period(f"{cells[1]} {cells[2]}"):
+            key, value = cells[0], f"{cells[1]} {cells[2]}"
         else:
             continue
         number = cell(value, dialect.decimal)

@@ -26,6 +26,7 @@ def read(path: Path) -> Table:
         table: Any = parquet.read_table(path)
         columns: list[Column] = []
         findings: list[Finding] = []
+        unread: dict[str, str] = {}
         for field in table.schema:
             values = _numbers(pa, table.column(field.name), field.type)
             if values is None:
@@ -36,6 +37,7 @@ def read(path: Path) -> Table:
                         f"column {field.name!r} holds {field.type}, not numbers; it was left out",
                     )
                 )
+                unread[str(field.name)] = str(table.column(field.name)[0])[:30] if table.num_rows else ""
                 continue
             meta: dict[bytes, bytes] = field.metadata or {}
             unit = (meta.get(b"unit") or meta.get(b"units") or b"").decode("utf-8", "replace")
@@ -44,7 +46,7 @@ def read(path: Path) -> Table:
         raise InputError(
             f"{path} cannot be read as Parquet ({type(error).__name__}: {error}); check that it is complete"
         ) from None
-    return Table("parquet", tuple(columns), findings=tuple(findings))
+    return Table("parquet", tuple(columns), findings=tuple(findings), unread=unread)
 
 
 def _numbers(pa: Any, column: Any, kind: Any) -> np.ndarray[Any, np.dtype[np.float64]] | None:

@@ -49,12 +49,15 @@ class Table:
         Single values found beside the columns.
     findings : tuple of Finding
         What was odd about the file.
+    unread : mapping of str to str
+        Name and first cell of columns that were left out, since they hold neither numbers nor a clock.
     """
 
     format: str
     columns: tuple[Column, ...]
     constants: Mapping[str, float | str] = field(default_factory=dict[str, float | str])
     findings: tuple[Finding, ...] = ()
+    unread: Mapping[str, str] = field(default_factory=dict[str, str])
 
 
 @dataclass(frozen=True)
