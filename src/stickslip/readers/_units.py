@@ -120,12 +120,16 @@ def parse_unit(text: str) -> Unit | None:
     """What a unit as written is in SI, or None where it is none.
 
     A number may stand before it, and a minus that turns the sign: "0.25 um" is a count of a quarter of a
-    micrometre, "-Nm" a torque that is positive the other way.
+    micrometre, "-Nm" a torque that is positive the other way; "--Nm" is none.
     """
     written = text.strip()
     if not written or len(written) > 40:
         return None
-    if written.startswith("-") and (turned := parse_unit(written[1:])) is not None:
+    if (
+        written.startswith("-")
+        and not written[1:].lstrip().startswith("-")
+        and (turned := parse_unit(written[1:])) is not None
+    ):
         return replace(turned, factor=-turned.factor)
     found = _plain(_normal(written))
     if found is None and (match := NUMBER.fullmatch(written)):

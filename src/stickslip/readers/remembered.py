@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers._choose import Choice, choose, meant, parse_mapping
 from stickslip.readers._units import parse_unit
@@ -37,6 +38,8 @@ BEHIND = {
 OTHER = 4.0
 """Times as large, or as small, from which on it is asked whether they hold."""
 FORGET = "delete that file to forget it"
+CODES = ("saved-numbers", "profile-misfit", "profile", "profile-idle")
+"""Of the findings that say what a saved profile did."""
 
 Picked = Mapping[str, tuple[Any, Statement]]
 """Value and origin of numbers, by name."""
@@ -189,11 +192,7 @@ def kept_now(
 def findings_of(path: Path, recalled: Recalled, mapping: Sequence[str], record: Record) -> list[Finding]:
     """What the profile at `path` did, beyond the mapping that is said now."""
     out = [*_foreign(recalled.foreign), *_misfits(recalled.foreign, record)]
-    said = parse_mapping(mapping)
-    more = [f"{role}={text}" for role, text in recalled.profile.mapping.items() if role not in said]
-    more += [f"{name} = {x}" for name, (x, _) in recalled.own.items()]
-    if more:
-        words = f"read by the saved profile {path}, which says {', '.join(more)}"
+    if words := _applied(path, recalled.profile.mapping, recalled.own, mapping):
         out.append(Finding("note", "profile", words, remedy=FORGET))
     for origin, names in _by_origin(recalled.idle):
         listed, options = _listed(recalled.idle, names), _options(recalled.idle, names)
@@ -202,6 +201,29 @@ def findings_of(path: Path, recalled: Recalled, mapping: Sequence[str], record: 
             Finding("note", "profile-idle", words, remedy=f"give {options}, if it holds for this axis")
         )
     return out
+
+
+def blamed(
+    error: InputError, path: Path, kept: Profile, recalled: Recalled | None, mapping: Sequence[str]
+) -> InputError:
+    """An error of a file that the profile at `path` had a part in: it names that; as it is where it had none."""
+    numbers = {**recalled.own, **recalled.foreign} if recalled else {}
+    words = _applied(path, kept.mapping, numbers, mapping)
+    return InputError(f"{error}; the file was {words}: {FORGET}") if words else error
+
+
+def _applied(path: Path, meanings: Mapping[str, str], numbers: Picked, mapping: Sequence[str]) -> str:
+    """What a profile says beyond the mapping that is said now, in words; empty where that is nothing."""
+    said = parse_mapping(mapping)
+    more = [_meaning(role, text) for role, text in meanings.items() if role not in said]
+    more += [f"{name} = {x}" for name, (x, _) in numbers.items()]
+    return f"read by the saved profile {path}, which says {', '.join(more)}" if more else ""
+
+
+def _meaning(role: str, text: str) -> str:
+    """What a channel is, and that its sign is turned where it is."""
+    turned = ":" in text and text.rsplit(":", 1)[1].lstrip().startswith("-")
+    return f"{role}={text}" + (" (the sign turned)" if turned else "")
 
 
 def _foreign(foreign: Picked) -> list[Finding]:

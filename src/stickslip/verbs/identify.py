@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, Unpack, cast
 
@@ -15,22 +15,23 @@ from stickslip import plugins
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
-from stickslip.identify.doctor import Diagnosis, examine
+from stickslip.identify.doctor import Diagnosis
 from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.experiment import DRIVES
 from stickslip.identify.methods import method_named
 from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.on_a_line import along_a_line, worded
-from stickslip.identify.regression.regressions import Regress, Regressions
+from stickslip.identify.regression.regressions import Regressions
 from stickslip.model import Model
 from stickslip.readers.convert import pendulum_before_gear
-from stickslip.readers.cut import file_rows, pieces
+from stickslip.readers.cut import file_rows
 from stickslip.readers.derive import positioned
 from stickslip.record import Record, row_period
 from stickslip.report.identified import Source
 from stickslip.spec import Law
+from stickslip.verbs.examiner import Examiner
 from stickslip.verbs.identification import IdentificationResult
-from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, doctor_of, named, open_log
+from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, named, open_log
 
 Loops = str | Mapping[str, float] | Sequence[str | Mapping[str, float]] | None
 
@@ -151,7 +152,7 @@ position_map, load, intervals, robust
         tell(f"{why}: --method hysteresis is taken, a law along the motion")
     kind.refuse_unknown(options)
     kind.check(records, options)
-    tell_warnings(sources, tell)
+    examiner.warn(sources)
     progress(f"method {kind.name}, {sum(len(r) for r in records)} samples")
     found = with_notes(identified(kind, sources, options), kind, records, options, left_out)
     found = replace(found, findings=tuple(f for s in sources for f in s.findings))
@@ -180,14 +181,6 @@ def with_pendulum(source: Source) -> list[Finding]:
     said = pendulum_before_gear(source.record, "a pendulum is asked for")
     taken = {"gravity", *(f.code for f in said)}
     return sorted_findings([*said, *(f for f in source.findings if f.code not in taken)])
-
-
-def tell_warnings(sources: Sequence[Source], tell: Callable[[str], None]) -> None:
-    """Tell what the doctor warns of."""
-    for s in sources:
-        for finding in s.findings:
-            if finding.level == "warning":
-                tell(f"{s.about['file'] or s.name}: {finding.line()}")
 
 
 def with_notes(
@@ -231,24 +224,6 @@ def laws_of(law: str | Law | Sequence[str | Law] | None) -> tuple[tuple[str | La
 # ---- logs ---------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Examiner:
-    """The doctor of `identify`: an error ends it."""
-
-    accept: Sequence[str]
-    regress: Regress
-    tell: Callable[[str], None]
-
-    def pieces(self, record: Record, log: Log | None) -> list[Diagnosis]:
-        """What it says of a record; several pieces where many rows in a row are left out."""
-        parts, short = pieces(record)
-        every = [examine(part, accept=self.accept, regress=self.regress) for part in parts]
-        for found in every:
-            if found.errors:
-                raise InputError(f"{named(log)}: {found.errors[0].line()}; see {doctor_of(log)}")
-        return [replace(every[0], findings=(*every[0].findings, *short)), *every[1:]]
-
-
 def sources_of(
     logs: Sequence[Log], held_out: Sequence[Log], loop: Loops, reading: Reading, examiner: Examiner
 ) -> list[Source]:
@@ -271,8 +246,6 @@ def sources_of(
             if number < fitted:
                 raise
             raise InputError(f"--hold-out: {error}") from None
-        for finding in opened.told:
-            examiner.tell(f"{name}: {finding.line()}")
         every = doctor(opened.record)
         short = Path(name).name if log is not None and name != "the log" else f"log {number + 1}"
         names = [short]

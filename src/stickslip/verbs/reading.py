@@ -114,11 +114,6 @@ class Opened:
     notes: tuple[Finding, ...] = ()
     columns: tuple[tuple[str, str], ...] = ()
 
-    @property
-    def told(self) -> tuple[Finding, ...]:
-        """Notes to show before a result: of a profile that was written, of numbers that one brings or leaves out."""
-        return tuple(f for f in self.notes if f.level == "note" and (self.written or " = " in f.message))
-
 
 @arguments_checked
 def read(log: Log | None = None, **reading: Unpack[Reading]) -> Record:
@@ -295,28 +290,42 @@ def _as_remembered(
     """A file read by what was said of files with its columns, which is kept for the next one."""
     found, digest = profiles.remembered(table), remembered.digest_of_file(path)
     kept = profiles.load(found) if found else None
-    drive, period, recalled = _drive(reading), reading.get("sample_time"), None
-    if kept is not None:
-        given = [n for n in (*NUMBERS, "side", "sample_time") if reading.get(n) is not None]
-        recalled = remembered.recall(kept, table, mapping, drive, given, digest)
-    used = recalled.profile if recalled else None
-    record = _part(
-        record_of(table, mapping, drive=drive, profile=used, sample_time=period), reading, str(path)
-    )
-    written, notes = None, list[Finding]()
+    drive, period = _drive(reading), reading.get("sample_time")
+    record, notes = _recalled(table, mapping, reading, found, kept, digest)
+    # Whoever judges the record has to know of the profile before.
+    record = _part(record, reading, str(path))
+    said: dict[str, Any] = record.meta["reading"]
+    said["findings"] += [note.as_data() for note in notes]
+    said["saved_profile"] = str(found) if notes else ""
+    written = None
     if _tells(mapping, drive, period):
         accept(record)
         now = remembered.kept_now(kept, record, mapping, drive, period, path, digest)
         if kept is None or not profiles.alike(now, kept):
             written = profiles.save(now, table)
-    if recalled and found:
-        notes = remembered.findings_of(found, recalled, mapping, record)
     if written and not notes:
         words = f"how to read files with these columns is kept in the profile {written}"
         notes.append(Finding("note", "profile", words, remedy=remembered.FORGET))
-    record.meta["reading"]["findings"] += [note.as_data() for note in notes]
-    record.meta["reading"]["profile"] = str(found) if found and notes and not written else ""
+        said["findings"].append(notes[0].as_data())
+    said["profile"] = str(found) if found and notes and not written else ""
     return Opened(with_source(record, path), found, written, tuple(notes), named_columns(table))
+
+
+def _recalled(
+    table: Table, mapping: Sequence[str], reading: Reading, found: Path | None, kept: profiles.Profile | None,
+    digest: str,
+) -> tuple[Record, list[Finding]]:  # fmt: skip
+    """The record of a table by what the profile at `found` says of it, and what that did."""
+    drive, period, recalled = _drive(reading), reading.get("sample_time"), None
+    if found is None or kept is None:
+        return record_of(table, mapping, drive=drive, sample_time=period), []
+    try:
+        given = [n for n in (*NUMBERS, "side", "sample_time") if reading.get(n) is not None]
+        recalled = remembered.recall(kept, table, mapping, drive, given, digest)
+        record = record_of(table, mapping, drive=drive, profile=recalled.profile, sample_time=period)
+    except InputError as error:
+        raise remembered.blamed(error, found, kept, recalled, mapping) from None
+    return record, remembered.findings_of(found, recalled, mapping, record)
 
 
 def columns_of(path: str | os.PathLike[str]) -> tuple[tuple[str, str], ...]:

@@ -17,6 +17,7 @@ from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import (
+    by_profile,
     change,
     excitation,
     magnitude,
@@ -182,7 +183,7 @@ def examine(
             findings = [f for f in findings if f.code not in vain]
     causes = {f.code for f in findings if f.level == "error" and f.code not in accept}
     follow = {code for cause in causes for code in CONSEQUENCES.get(cause, ())}
-    findings = [f for f in findings if f.code not in follow]
+    findings = by_profile.told([f for f in findings if f.code not in follow], view)
     findings = [
         replace(f, level="warning") if f.level == "error" and f.code in accept and f.code not in FINAL else f
         for f in findings

@@ -30,12 +30,13 @@ MAX_ROWS = 200_000
 @dataclass(frozen=True, slots=True)
 class Column:
     """How a channel was read: the column in the file, whether anybody states its unit, whether its name says that it
-    is a command."""
+    is a command, and whether a profile says the unit."""
 
     name: str
     unit: str
     stated: bool
     commanded: bool = False
+    by_profile: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +84,13 @@ class View:
         """How every channel was read; a record that was not read from a file states its units."""
         listed: list[dict[str, Any]] = self.record.meta.get("reading", {}).get("columns", [])
         return {
-            c["channel"]: Column(c["column"], c["unit"], c["source"] != "assumed", c.get("commanded", False))
+            c["channel"]: Column(
+                c["column"],
+                c["unit"],
+                c["source"] != "assumed",
+                c.get("commanded", False),
+                c["source"] == "profile",
+            )
             for c in listed
         }
 
@@ -112,9 +119,8 @@ class View:
         if channel == "motor_torque" and self.from_current:
             channel = "current"
         if unit == "-":
-            unit = "-" + (
-                self.columns[channel].unit if channel in self.columns else self.record.units[channel]
-            )
+            own = self.columns[channel].unit if channel in self.columns else self.record.units[channel]
+            unit = own[1:].lstrip() if own.startswith("-") else f"-{own}"
         return "--map " + shlex.quote(f"{channel}={self.name(channel)}:{unit}")
 
     @property
