@@ -31,6 +31,7 @@ T = np.arange(0.0, 2.0, 1e-3)
         ("give --set fs=.. (values)", "identify", False, 'give values={"fs": ..} (values)'),
         ("give --set bits=VALUE", "export", False, 'give settings={"bits": VALUE}'),
         ("with --leave-out spikes", "identify", False, 'with leave_out=["spikes"]'),
+        ("with --leave-out 1:4 --leave-out 7:9, or", "identify", False, 'with leave_out=["1:4", "7:9"], or'),
         ("its controller (--loop kp=..,kd=..)", "identify", False, 'its controller (loop={"kp": .., "kd": ..})'),
         ("give --side load, and", "identify", False, 'give side="load", and'),
         ("identify with --pendulum, or", "identify", False, "identify with pendulum=True, or"),

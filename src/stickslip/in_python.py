@@ -26,6 +26,8 @@ MAPS = re.compile(rf"({MAP}(?: {MAP})*)( (?=--))?")
 ONE_MAP = re.compile(r"--map (?:'([^']+)'|(\S+))")
 SET = re.compile(r"--set (\w+)=(\.\.|[^\s,;:)]*)")
 LOOP = re.compile(r"--loop (\w+=[^\s;)]*[^\s;),])")
+SAME_LISTS, ITEM = re.compile(r"(\w+)=\[[^\]]*\](?: \1=\[[^\]]*\])+"), re.compile(r"(?<=\[)[^\]]*(?=\])")
+"""A list argument for each of several options, and what is in them"""
 WORD = "side|method|compensator|to|intervals|linear|accept|leave-out|extra-torque"
 OPTION = re.compile(
     rf"--(?:(?P<option>{WORD})(?![\w-])(?: (?P<word>(?!out\b|and\b|or\b)[\w:.-]*\w))?"
@@ -69,7 +71,8 @@ def _said(text: str, function: str, arrays: bool) -> str:
     text = MAPS.sub(lambda m: _map(ONE_MAP.findall(m[1]), arrays) + (", " if m[2] else ""), text)
     text = SET.sub(lambda m: f'{settings}={{"{m[1]}": {m[2] or ".."}}}', text)
     text = LOOP.sub(lambda m: "loop={" + ", ".join(_item(x, "=") for x in m[1].split(",")) + "}", text)
-    return OPTION.sub(lambda m: _argument(m, function), text)
+    text = OPTION.sub(lambda m: _argument(m, function), text)
+    return SAME_LISTS.sub(lambda m: f"{m[1]}=[{', '.join(ITEM.findall(m[0]))}]", text)
 
 
 def _map(found: list[tuple[str, str]], arrays: bool) -> str:

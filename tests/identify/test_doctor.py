@@ -16,6 +16,7 @@ from stickslip.cli import main
 from stickslip.errors import InputError
 from stickslip.identify.doctor import ERRORS, examine
 from stickslip.readers import Drive, read
+from stickslip.readers.cut import Cut, cut
 from support.doctor_logs import (
     BARE,
     DEG,
@@ -277,6 +278,17 @@ def test_one_direction_is_no_turned_sign(seed):
     lowered = [f for f in examine(one_way(-2.0, seed)).findings if f.code == "torque-sign"]
     assert [f.level for f in lowered] == ["warning"]
     assert "a load drives it" in lowered[0].message
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_in_one_direction_no_constant_torque_is_told_from_friction(seed):
+    """Half of both was told as the torque's constant part."""
+    back = one_way(0.4, seed)
+    assert "offset" not in {f.code for f in examine(back).findings}
+    forth = cut(back, Cut(end=3.9))
+    found = {f.code: f.message for f in examine(forth).findings}
+    assert "offset" not in found
+    assert "friction is not told from a constant torque" in found["no-reversal"]
 
 
 def test_who_knows_better_says_accept(tmp_path, capsys):

@@ -157,6 +157,52 @@ def test_clipped_torques_are_found(kind):
     assert f"{level:g}" in codes(record(clipped))["saturation"]
 
 
+def limited(bursts: int, count: int = 6000) -> Record:
+    """A motion whose torque is cut off in so many bursts of 150 rows each, in the first part of the record."""
+    t = 1e-3 * np.arange(count)
+    torque = np.sin(2.0 * np.pi * 1.7 * t) + 0.01 * np.random.default_rng(3).standard_normal(count)
+    for k in range(bursts):
+        torque[100 + 400 * k : 250 + 400 * k] = 2.2
+    return Record(t, {"position": np.sin(2.0 * np.pi * 1.7 * t), "motor_torque": torque}, UNITS)
+
+
+@pytest.mark.parametrize(
+    ("bursts", "count", "what", "remedy"),
+    [
+        (
+            1,
+            6000,
+            "150 rows in one stretch of rows 101:250",
+            "or leave these rows out with --leave-out 101:250",
+        ),
+        (
+            2,
+            6000,
+            "300 rows in 2 stretches of rows 101:250, 501:650",
+            "--leave-out 101:250 --leave-out 501:650",
+        ),
+        (
+            5,
+            6000,
+            "750 rows in 5 stretches, first 101:250",
+            "or use the longest part without, --rows 1851:6000",
+        ),
+        (
+            15,
+            6000,
+            "2250 rows in 15 stretches, first 101:250",
+            "or a higher limit: too little is left between",
+        ),
+    ],
+)
+def test_what_helps_where_a_torque_is_cut_off(bursts, count, what, remedy):
+    """The first row of hundreds was named, and all were to be left out by hand."""
+    (found,) = [f for f in examine(limited(bursts, count)).findings if f.code == "saturation"]
+    assert what in found.message
+    assert found.remedy.startswith("what was cut off is lost: record again with gentler accelerations")
+    assert remedy in found.remedy
+
+
 def coarse(limit: float) -> Record:
     """Moves with rests whose torque a drive writes down in 60 steps, as a controller's that a coarse encoder holds
     still from row to row; cut off at a limit."""

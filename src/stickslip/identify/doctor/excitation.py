@@ -103,7 +103,8 @@ def reversed_and_slow(view: View, stribeck_velocity: float | None = None) -> Ite
         yield Finding(
             "warning",
             "no-reversal",
-            "the axis never reverses: friction of one direction and hysteresis stay unknown",
+            "the axis never reverses: friction of the other direction and hysteresis stay unknown, and friction is "
+            "not told from a constant torque (weight, offset)",
             remedy="add motion in the other direction",
         )
     travel = float(np.ptp(smooth.position))

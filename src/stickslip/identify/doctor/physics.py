@@ -74,8 +74,7 @@ def sign(view: View) -> Iterator[Finding]:
         return
     measured = view.torque_channel == "friction_torque"
     turned = view.mapped(view.torque_channel, "-")
-    forth = float(np.mean(smooth.velocity[smooth.moving] > 0.0))
-    if not BOTH < forth < 1.0 - BOTH and not measured:
+    if not _both_ways(smooth) and not measured:
         yield from _one_way(smooth, view, turned)
         return
     fit = _fit(smooth, 0, measured=measured)
@@ -97,6 +96,11 @@ def sign(view: View) -> Iterator[Finding]:
         f"say {turned}, if positive torque drives backwards, or --accept torque-sign if you know it is right"
     )
     yield Finding("error", "torque-sign", message, remedy=remedy)
+
+
+def _both_ways(smooth: Smooth) -> bool:
+    """Whether friction is told from a constant torque: the axis moves in both directions."""
+    return BOTH < float(np.mean(smooth.velocity[smooth.moving] > 0.0)) < 1.0 - BOTH
 
 
 def _one_way(smooth: Smooth, view: View, turned: str) -> Iterator[Finding]:
@@ -246,7 +250,8 @@ def _once_a_turn(smooth: Smooth, plain: Fit, turns: float) -> tuple[float, float
 def _offset(view: View, smooth: Smooth, plain: Fit) -> Iterator[Finding]:
     """A constant torque against Coulomb friction, where certain sliding tells that; else against the whole torque."""
     offset, part, found = plain.values[3], "", view.sliding
-    large = abs(offset) > WEIGHT * float(np.std(smooth.torque)) and plain.explained > 0.5
+    weighs = abs(offset) > WEIGHT * float(np.std(smooth.torque)) and plain.explained > 0.5
+    large = weighs and _both_ways(smooth)
     if found is not None and not found.doubt:
         (low, high), coulomb = found.interval("fc"), found.numbers["fc"].value
         if high - low < 2.0 * TOLD * coulomb:

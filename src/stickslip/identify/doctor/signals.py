@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.identify.doctor.spikes import LATE, sticking_out
 from stickslip.identify.doctor.view import Array, Mask, View, is_number, row
+from stickslip.readers.cut import FEWEST as PIECE
 from stickslip.readers.cut import RANGE, jumps
 from stickslip.record import encoder_step
 
@@ -30,6 +31,9 @@ COUNTED, SOURCE, REPEATED, CATCHES_UP, FEWEST = 3.0, 20, 0.15, 1.15, 50
 """Steps of the encoder by which a row moves on where its position must be a new one; rows on end that a slow source may
 repeat: at a stop there are more; share of those rows from which on it is told; times the way of a row that a new
 position is away from one that stood; and how many rows there must be."""
+FEW_STRETCHES, LONG_PART, GOES = 3, 0.3, 0.1
+"""Stretches at a limit that a remedy names one by one; share of the rows from which on a part without is worth using,
+and of the part's rows that must move."""
 LOST = 1.5
 """Times from row to row, from which on a row is missing."""
 LEAPS = 99.0
@@ -67,18 +71,55 @@ def saturated(view: View) -> Iterator[Finding]:
         if tops is None or (channel == "velocity" and not _outrun(view, values, tops[0])):
             continue
         at, limits = tops
-        share, index = float(np.mean(at)), int(np.flatnonzero(view.usable)[np.flatnonzero(at)[0]])
-        unit = view.record.units[channel]
+        share, unit = float(np.mean(at)), view.record.units[channel]
         if view.commanded(channel):
             yield _limited_command(channel, limits, unit, share)
             continue
-        yield Finding(
-            "warning",
-            "saturation",
-            f"{channel} sits at its limit of {limits} {unit} in {100 * share:.3g} % of the rows",
-            row(index, view),
-            "reduce the demand, or leave these rows out with --leave-out A:B: what was cut off is lost",
+        yield _cut_off(view, channel, at, f"{limits} {unit}")
+
+
+def _cut_off(view: View, channel: str, at: Mask, limits: str) -> Finding:
+    """That a signal stands at its limit: in how many rows and stretches, and what is left to do."""
+    indices = np.flatnonzero(at)
+    stretches = np.split(indices, np.flatnonzero(np.diff(indices) > PIECE) + 1)
+    number = view.file_rows[view.usable]
+    ranges = [f"{number[s[0]]}:{number[s[-1]]}" for s in stretches]
+    many = len(ranges) > FEW_STRETCHES
+    of = f"{len(ranges)} stretches" if len(ranges) > 1 else "one stretch"
+    message = (
+        f"{channel} sits at its limit of {limits} in {100 * float(np.mean(at)):.3g} % of the rows: {indices.size} rows "
+        f"in {of}{', first ' if many else ' of rows '}{ranges[0] if many else ', '.join(ranges)}"
+    )
+    gentler = "slower moves" if channel == "velocity" else "gentler accelerations"
+    remedy = f"what was cut off is lost: record again with {gentler}"
+    if not many:
+        return Finding(
+            "warning", "saturation", message,
+            remedy=f"{remedy}, or leave these rows out with {' '.join(f'--leave-out {r}' for r in ranges)}",
+        )  # fmt: skip
+    begin, end = _longest_without(view, stretches, at.size)
+    if end > begin:
+        part = f"--rows {number[begin]}:{number[end - 1]}"
+        return Finding(
+            "warning", "saturation", message, remedy=f"{remedy}, or use the longest part without, {part}"
         )
+    remedy += " or a higher limit: too little is left between these stretches to leave them out"
+    return Finding("warning", "saturation", message, remedy=remedy)
+
+
+def _longest_without(view: View, stretches: Sequence[Any], count: int) -> tuple[int, int]:
+    """First row and the one behind the last of the longest part outside all stretches, where it is long and the axis
+    moves there; else 0, 0."""
+    begins = np.array([0, *(s[-1] + 1 for s in stretches)])
+    ends = np.array([*(s[0] for s in stretches), count])
+    best = int(np.argmax(ends - begins))
+    begin, end = int(begins[best]), int(ends[best])
+    smooth = view.smooth
+    if smooth is None or end - begin < LONG_PART * count:
+        return 0, 0
+    size = smooth.moving.size
+    there = smooth.moving[begin * size // count : end * size // count]
+    return (begin, end) if float(np.mean(there)) >= GOES else (0, 0)
 
 
 def _limited_command(channel: str, limits: str, unit: str, share: float) -> Finding:
