@@ -31,7 +31,7 @@ def stated_period(constants: Mapping[str, float | str]) -> tuple[str, str, float
         if not SAYS.fullmatch(key):
             continue
         unit = match[1] if (match := IN_BRACKETS.search(name)) is not None else ""
-        text = f"{value:g} {unit}" if isinstance(value, float) else value
+        text = value if isinstance(value, str) else f"{value:g} {unit}"
         period = _seconds(text)
         if math.isfinite(period):
             return name, text, period
