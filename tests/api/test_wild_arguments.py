@@ -227,7 +227,7 @@ def _no_work(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         "verbs.identification.answers_of", "verbs.sweep.dataset.read",
     ):  # fmt: skip
         monkeypatch.setattr(f"stickslip.{place}", reached)
-    monkeypatch.setattr("stickslip.verbs.identify.examine", lambda record, **_: Diagnosis((), record))
+    monkeypatch.setattr("stickslip.verbs.examiner.examine", lambda record, **_: Diagnosis((), record))
 
 
 @pytest.mark.parametrize("name", CALLS)
