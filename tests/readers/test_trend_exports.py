@@ -28,9 +28,9 @@ def trend(path: Path, sign: str = ";", clock: bool = True) -> Path:
     return path
 
 
-@pytest.mark.parametrize("sign", [";", ":", "."])
+@pytest.mark.parametrize("sign", [";", ":", ".", ","])
 def test_a_trends_clock_is_read_with_its_milliseconds(tmp_path, sign):
-    """With a semicolon the file was said to have no column 'Time'."""
+    """With a semicolon the file was said to have no column 'Time'; with a comma its milliseconds were the position."""
     record = read(trend(tmp_path / "trend.csv", sign), ["time=Time"])
     np.testing.assert_allclose(record.time - record.time[0], 8e-3 * np.arange(N), atol=1e-9)
     np.testing.assert_allclose(record["position"], Q, atol=1e-4)
@@ -46,6 +46,13 @@ def test_a_trends_clock_is_read_with_its_milliseconds(tmp_path, sign):
 )  # fmt: skip
 def test_signs_before_milliseconds(text, seconds):
     assert cell(text, ".") == (None if seconds is None else pytest.approx(seconds, abs=1e-9))
+
+
+def test_whole_seconds_beside_a_column_of_three_digits_stay_apart(tmp_path):
+    rows = [f"10:15:{k:02d},{100 + k},{k % 7}" for k in range(60)]
+    (tmp_path / "log.csv").write_text("Time,Position [deg],Torque [Nm]\n" + "\n".join(rows) + "\n")
+    record = read(tmp_path / "log.csv")
+    np.testing.assert_allclose(np.degrees(record["position"]), 100.0 + np.arange(60))
 
 
 def test_a_column_of_words_is_there_and_cannot_be_read(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from datetime import UTC, datetime
 
 import numpy as np
@@ -37,6 +38,8 @@ THOUSANDS = {
 """Numbers with signs between the thousands, by the decimal sign."""
 OF_DAY = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d)(?:[.,](\d+)|[;:](\d{1,3}))?")
 """Hours, minutes, seconds; a fraction of these, or milliseconds apart (Studio 5000: ``10:15:22;122``)."""
+IN_TWO = re.compile(r"(?<![\d:])((?:[01]?\d|2[0-3]):[0-5]\d:[0-5]\d),(\d{3})(?=,)")
+"""A time of day whose milliseconds the comma between cells cuts off."""
 DAY = 86400.0
 
 
@@ -76,6 +79,18 @@ def moment(word: str) -> float | None:
         return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
     except (OverflowError, ValueError, OSError):
         return None
+
+
+def clocks_whole(lines: Sequence[str]) -> Sequence[str]:
+    """Lines with a point before the milliseconds, where a comma cut every clock in two: the header has a cell less."""
+    first = next((i for i, line in enumerate(lines) if IN_TWO.search(line)), 0)
+    above = next((line for line in reversed(lines[:first]) if line.strip()), "")
+    if not above or lines[first].count(",") != above.count(",") + 1:
+        return lines
+    rows = [line for line in lines[first : first + 100] if line.strip()]
+    if sum(bool(IN_TWO.search(line)) for line in rows) < 0.8 * len(rows):
+        return lines
+    return [IN_TWO.sub(r"\1.\2", line, count=1) for line in lines]
 
 
 def over_midnight(values: Array, daily: bool | None) -> Array:

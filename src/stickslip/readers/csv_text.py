@@ -15,7 +15,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers import _scope
-from stickslip.readers._cells import OF_DAY, cell, moment, over_midnight
+from stickslip.readers._cells import OF_DAY, cell, clocks_whole, moment, over_midnight
 from stickslip.readers._stated_period import is_period
 from stickslip.readers._units import may_be_unit
 from stickslip.readers.table_columns import Array, Column, Format, Table
@@ -69,7 +69,7 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """Every column of a text table."""
-    lines = _decode(path).splitlines()
+    lines = clocks_whole(_decode(path).splitlines())
     dialect = _sniff(path, lines)
     above = [line for line in lines[: dialect.start] if line.strip()]
     header = [dialect.split(COMMENT.sub("", line)) for line in above]
