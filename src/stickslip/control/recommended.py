@@ -30,6 +30,7 @@ class Recommended:
     compensator : str
         "feedforward" or "feedback".
     gain : float
+        0: no friction is compensated, inertia and offset alone are fed forward.
     bandwidth, damping : float
         Of the PD's poles, Hz and -.
     inertia : float
@@ -130,7 +131,7 @@ def recommended_in(whole: Table) -> Recommended:
     with whole.table("recommended") as given:
         own = _loop(given) if given.has("loop") else None
         return Recommended(
-            given.choice("compensator", COMPENSATORS), given.positive("gain", ""),
+            given.choice("compensator", COMPENSATORS), given.number("gain", "", lower=0.0),
             0.0 if own else given.positive("bandwidth", "Hz"), 0.0 if own else given.positive("damping", ""),
             given.positive("inertia", "kg·m²"), given.number("lead", "s", 0.0, 0.0),
             given.number("deadband", "rad/s", 0.0, 0.0), given.number("filter", "Hz", 0.0, 0.0),

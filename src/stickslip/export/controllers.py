@@ -125,6 +125,8 @@ def _gives(part: str, block: ControlBlock) -> str:
     """What a law of the controller gives; parameters by their whole names."""
     own = block.own
     if block.law.name in ("friction_feedforward", "friction_feedback"):
+        if not own["gain"]:
+            return "no friction torque (gain 0)"
         velocity = "reference's" if block.law.place == "feedforward" else "measured"
         return f"{own['gain']:.6g} times the friction law's torque at the {velocity} velocity"
     if block.law.name == "inertia_feedforward":

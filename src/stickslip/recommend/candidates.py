@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,11 @@ from stickslip.recommend.ringing import by_counts, hunting, integral_of, swing_a
 from stickslip.recommend.swings import between_counts
 
 AFTER_A_PUSH = "limit cycle at rest after a push"
+
+WORTH = 0.95
+"""A compensator that leaves more than this part of the error is not worth its risk."""
+HARDLY = f"hardly less error (more than {100.0 * WORTH:g} % left)"
+"""Why a safe setting is not worth it."""
 
 FOLLOWS, LIVELY = 3.0, 5.0
 """An axis that the drive's own loop does not hold is not the user's: times the best estimate's error, and swings per
@@ -47,6 +53,7 @@ class Setting:
     law, kind : str
         ``kind`` is "feedforward" or "feedback".
     gain : float
+        0: no friction is compensated, but inertia and offset are fed forward.
     lead : float
         s, by which a feedforward looks ahead of the reference.
     deadband : float
@@ -65,6 +72,16 @@ class Setting:
     inertia_feedforward: float = 0.0
     offset: float = 0.0
 
+    @property
+    def compensates(self) -> bool:
+        """Whether friction is compensated."""
+        return self.gain > 0.0
+
+    @property
+    def label(self) -> str:
+        """The law that compensates friction, or what is fed forward without one."""
+        return self.law if self.compensates else "inertia alone"
+
     def on(self, linear: Controller, model: Model) -> Controller:
         """The linear controller with this compensator."""
         if not linear.is_short:
@@ -82,6 +99,8 @@ class Setting:
             fed = {"inertia": self.inertia_feedforward, "offset": self.offset}
             more.append(ControlBlock("inertia_feedforward", None, None, **fed))
         numbers: dict[str, Any] = {"gain": self.gain, "deadband": self.deadband}
+        if not self.compensates:
+            return loop.with_blocks([*loop.blocks.values(), *more])
         if self.kind == "feedforward":
             more.append(ControlBlock("friction_feedforward", model, lead=self.lead, **numbers))
         else:
@@ -102,7 +121,7 @@ class Candidate:
     unsafe : tuple of str
         Why it is not safe to switch on; empty where it is.
     useless : str
-        Why it is not worth it where it is safe; empty where that is not known.
+        Why it is not worth it where it is safe; empty where it is.
     """
 
     setting: Setting
@@ -119,6 +138,12 @@ class Candidate:
     def worst(self) -> float:
         """The greatest remaining part of the error."""
         return max(self.errors)
+
+    @property
+    def usual(self) -> float:
+        """The part of the error that remains at most on half of the axes; the best estimate counts where it is the only
+        one."""
+        return median(self.errors[1:] or self.errors)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -234,7 +259,7 @@ class Bench:
                 unsafe = (AFTER_A_PUSH,)
             if unsafe:
                 return Candidate(setting, tuple(errors), unsafe)
-        return Candidate(setting, tuple(errors), ())
+        return Candidate(setting, tuple(errors), (), HARDLY if max(errors) > WORTH else "")
 
     def swings_on(self, i: int, controller: Controller) -> bool:
         """Whether after a push at rest axis i swings on under this controller, and not under the linear one."""

@@ -18,14 +18,11 @@ from stickslip.recommend.sample_time import ROWS
 
 MOSTLY = 0.5
 """Of the error: what a lag makes beyond that is most of it."""
-WORTH = 0.95
-"""A compensator that leaves more than this part of the error is not worth its risk."""
 ALLOWANCE, BETTER = 1.4, 2.0
 """Factors on the error left, upwards and downwards, for resonances, backlash, cogging and the like, which a machine has
 or has not: so the promise held in `benchmarks/promise.py`."""
 BETTER_AT_MOTOR = 5.0
 """The second where friction is simulated at the load, and may act at the motor: so it held in `benchmarks/belts.py`."""
-HARDLY = f"hardly less error (more than {100.0 * WORTH:g} % left)"
 UNSURE = f"no certain reduction (more than {100.0 / ALLOWANCE:.0f} % left)"
 """Why a safe setting is not worth it."""
 
@@ -119,7 +116,7 @@ def notes_on(
         yield from _none(candidates, unknown)
         return
     stiffer = [c for c in candidates if c.setting.kind == "feedback" and c.setting.gain == 1.0 and c.unsafe]
-    if stiffer:
+    if stiffer and chosen.setting.compensates:
         yield f"Feedback at gain 1 is not safe: {', '.join(stiffer[0].unsafe)}."
     if abs(float(found.axis.get("offset", 0.0))) > 0.0:
         offset = f"{float(found.axis['offset']):.4g} {found.unit('N·m')}"
@@ -144,10 +141,48 @@ def _intervals(found: Identified, unknown: Sequence[str]) -> Iterator[str]:
         )
 
 
+def beyond_inertia(
+    chosen: Candidate | None, friction: Candidate | None, candidates: Sequence[Candidate]
+) -> Iterator[str]:
+    """Why friction is not compensated beside the inertia feedforward, where that alone is switched on."""
+    if chosen is None or chosen.setting.compensates:
+        return
+    why = why_none([c for c in candidates if c.setting.compensates])
+    if friction is not None:
+        best, alone = friction.setting, chosen
+        why = (
+            f"on the sampled axes it adds hardly anything; the best ({best.kind} of law {best.law!r}, gain "
+            f"{best.gain:g}) leaves {_left(friction)}, the inertia feedforward alone {_left(alone)}"
+        )
+    yield f"No friction compensation beyond the inertia feedforward is recommended: {why}."
+    yield "A drive that feeds its acceleration forward already has it: there is nothing more to switch on."
+
+
+def _left(candidate: Candidate) -> str:
+    """What it leaves of the error."""
+    worst = f"{100.0 * candidate.worst:.1f} % of the error on the worst axis"
+    usual = f" and at most {100.0 * candidate.usual:.1f} % on half of them"
+    return worst + (usual if len(candidate.errors) > 2 else "")
+
+
+def why_none(candidates: Sequence[Candidate]) -> str:
+    """Why none of them is recommended: what the safe ones lack, and what is not safe about the others."""
+    safe = [c for c in candidates if not c.unsafe]
+    useless = sorted({c.useless for c in safe if c.useless})
+    unsafe = ", ".join(sorted({said for c in candidates for said in c.unsafe}))
+    if not safe:
+        return unsafe or "none was tried"
+    best = 100.0 * min(c.worst for c in safe)
+    said = (
+        f"what is safe gives {', '.join(useless) or 'no less error'}, at best {best:.1f} % left on the worst axis "
+        "simulated"
+    )
+    return f"{said}; the rest is not safe: {unsafe}" if unsafe else said
+
+
 def _none(candidates: Sequence[Candidate], unknown: Sequence[str]) -> Iterator[str]:
     """Why no compensator is recommended."""
-    reasons = sorted({r for c in candidates for r in c.refused}) or ["none reduces the error by 5 %"]
-    yield f"No compensator is recommended: {', '.join(reasons)}."
+    yield f"No compensator is recommended: {why_none(candidates)}."
     unsure = [c.worst for c in candidates if c.useless.startswith(UNSURE)]
     if unsure:
         yield (
@@ -155,8 +190,8 @@ def _none(candidates: Sequence[Candidate], unknown: Sequence[str]) -> Iterator[s
             f"{ALLOWANCE:g} times that is allowed for, for what is not simulated, so that no reduction is certain "
             f"above {100.0 / ALLOWANCE:.0f} % left."
         )
-    # Of those that go beyond the best estimate, which is simulated first.
-    left = [c.errors[0] for c in candidates if len(c.errors) > 1 and c.errors[0] < 1.0]
+    # Of those that go beyond the best estimate, which is simulated first, and would do if it were all.
+    left = [c.errors[0] for c in candidates if len(c.errors) > 1 and ALLOWANCE * c.errors[0] <= 1.0]
     if unknown and left:
         yield (
             f"On the best estimate {100.0 * min(left):.0f} % of the error would be left; other axes that the "

@@ -11,12 +11,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from stickslip.errors import InputError
-from stickslip.friction_levels import line_beyond
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.monte_carlo import with_values
 from stickslip.model import Model
 from stickslip.recommend.axes import plants_of
 from stickslip.recommend.beside import belief_of, limit_cycle, tried_beside
@@ -33,17 +31,17 @@ from stickslip.recommend.candidates import (
 )
 from stickslip.recommend.notes import (
     ALLOWANCE,
-    HARDLY,
     UNSURE,
-    WORTH,
     axes_left_out,
     better_than_simulated,
+    beyond_inertia,
     lag_of,
     notes_on,
     sampled_as,
     weak_on,
 )
 from stickslip.recommend.plant import Plant
+from stickslip.recommend.question import cautious, inertia_of, laws_of, with_motion
 from stickslip.recommend.recommendation import Recommendation
 from stickslip.recommend.refusals import held, refuse_endless, refuse_unknown, refuse_weak
 
@@ -101,31 +99,27 @@ def recommend(
     drive = with_motion(found, drive)
     refuse_unknown(found)
     refuse_weak(found, drive)
-    linear, start = drive.loop(j), float(drive.path.position[0])
+    linear = drive.loop(j)
     if not found.law_estimates[0]:
         axes = confirm = 0  # Nothing of the friction would be drawn.
     laws = laws_of(cautious(found))
     offset = float(found.axis.get("offset", 0.0) or 0.0)
     fed = j if feed_inertia and not linear.answers_to_acceleration else 0.0
-    settings = [replace(setting, offset=offset) for setting in settings_of(laws, drive, fed, GAINS)]
+    tried = (*inertia_alone(found.model, fed), *settings_of(laws, drive, fed, GAINS))
+    settings = [replace(setting, offset=offset) for setting in tried]
     # Each with the linear controller alone; then leads, the guard and the gains beyond.
-    more = (axes + 1) * (len(LEADS) + 1 + len(BEYOND)) + (confirm + 1) * (3 + len(BEYOND))
+    more = (axes + 1) * (len(LEADS) + 1 + len(BEYOND)) + (confirm + 1) * (4 + len(BEYOND))
     account = Account(progress, len(settings), axes + 1, more)
     refuse_endless(account.total, drive, axes, confirm)
-
-    def drawn(count: int, seed: int) -> Bench:
-        own = drive.given  # Only of a loop that somebody runs is it known that it holds the axis.
-        plants = plants_of(
-            found, j, (TRIES if own else 1) * count, seed, start, inertia is not None, drive.machine
-        )
-        return (Bench.held(plants, count, linear, drive, laws, account.one) if own
-                else Bench(list(plants), linear, drive, laws, account.one))  # fmt: skip
-
-    bench, others = drawn(axes, seed), drawn(confirm, seed + 1)
+    bench, others = (
+        drawn(found, inertia, count, start_of_draws, Bench([], linear, drive, laws, account.one))
+        for count, start_of_draws in ((axes, seed), (confirm, seed + 1))
+    )
     first = held(found, bench.before(0), drive, inertia)
     # By the axes of the confirmation, if there are more of them: what is said is then the same for any `axes`.
     rung = rings_alone(max(others, bench, key=lambda b: len(b.plants)), j, found.unit("N·m"))
-    chosen, candidates, margin, unsafe_gain = picked(settings, bench, others, account)
+    choice = picked(settings, bench, others, account)
+    chosen = choice.chosen
     beside, hunts = (), ""
     if compensators:
         belief = belief_of(found.model, drive, j)
@@ -135,12 +129,16 @@ def recommend(
     notes = [
         *sampled_as(drive, chosen), *axes_left_out(bench, others, found),
         *lag_of(bench.plants[0], first, linear, drive),
-        *notes_on(found, chosen, candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine),
+        *notes_on(
+            found, chosen, choice.candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine,
+        ),
+        *beyond_inertia(chosen, choice.friction, choice.candidates),
     ]  # fmt: skip
     return Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, linear.numbers(),
-        first.moving["position_rms_rad"], margin, unsafe_gain, tuple(candidates), len(bench.plants),
+        first.moving["position_rms_rad"], choice.margin, choice.unsafe_gain, choice.candidates, len(bench.plants),
         tuple(notes), drive, rung, j, beside, hunts, better_than_simulated(drive.machine, found.train),
+        choice.inertia_alone, choice.friction,
     )  # fmt: skip
 
 
@@ -200,68 +198,24 @@ def recommend_on(
     )  # fmt: skip
 
 
-def inertia_of(found: Identified, given: float | None) -> float:
-    """The inertia that was given, else the model's, kg·m².
-
-    Raises
-    ------
-    InputError
-        If there is none, or it is not greater than 0 and finite.
-    """
-    j = given if given is not None else found.axis.get("inertia")
-    unit = found.unit("kg·m²")
-    if j is None:
-        raise InputError(f"{found.path} holds no inertia; give --inertia in {unit}")
-    if not 0.0 < j < math.inf:
-        raise InputError(
-            f"inertia = {j:g} {unit} must be greater than 0 and finite; give another one with --inertia"
-        )
-    return float(j)
+def drawn(found: Identified, inertia: float | None, count: int, seed: int, empty: Bench) -> Bench:
+    """The best estimate and `count` axes from the model's intervals, in place of the empty bench's; `inertia` is one
+    that was given, kg·m²."""
+    linear, drive, laws, ran = empty.linear, empty.drive, empty.laws, empty.ran
+    own = drive.given  # Only of a loop that somebody runs is it known that it holds the axis.
+    plants = plants_of(
+        found, inertia_of(found, inertia), (TRIES if own else 1) * count, seed, float(drive.path.position[0]),
+        inertia is not None, drive.machine,
+    )  # fmt: skip
+    return (
+        Bench.held(plants, count, linear, drive, laws, ran) if own else Bench(list(plants), linear, drive, laws, ran)
+    )  # fmt: skip
 
 
-def with_motion(found: Identified, drive: Drive) -> Drive:
-    """The drive with the motion of the record where it names none.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
-    if drive.motion is not None or drive.amplitude is not None:
-        return drive
-    if found.trajectory is None:
-        raise InputError(
-            f"{found.path} holds no motion ([trajectory]): identify the axis again, or give the motion to try a "
-            f"setting along, --motion FILE.csv, or the --amplitude of a slow sinusoid in {found.unit('rad')}"
-        )
-    return replace(drive, motion=found.trajectory)
-
-
-def cautious(found: Identified) -> Model:
-    """The law as it is fed forward: viscous friction that no record told at the lower end of its interval.
-
-    Too much of it pushes at every speed; too little leaves what the loop had to do anyway.
-    """
-    least = {
-        e.name: max(e.lower, 0.0) for e in found.estimates if e.name.startswith("sigma2") and not e.identified
-    }
-    return with_values(found.model, least)
-
-
-def laws_of(model: Model) -> dict[str, Model]:
-    """The law itself, and Coulomb with viscous friction through its sliding curve: what every drive can run."""
-    laws = {model.law.name: model}
-    if model.law.name == "coulomb" or not model.law.steady:
-        return laws
-    (level, slope), (back, falling) = (line_beyond(model, d) for d in (1.0, -1.0))
-    if level <= 0.0 or back <= 0.0:
-        return laws
-    if model.law.odd:
-        laws["coulomb"] = Model("coulomb", fc=level, sigma2=slope)
-        return laws
-    each = {"fc": level, "sigma2": slope, "fc_negative": back, "sigma2_negative": falling}
-    laws["coulomb"] = Model("coulomb", {"symmetry": "asymmetric"}, **each)
-    return laws
+def inertia_alone(model: Model, inertia: float) -> Iterator[Setting]:
+    """The setting that feeds the inertia forward, kg·m², and compensates no friction; none without inertia."""
+    if inertia > 0.0:
+        yield Setting(model.law.name, "feedforward", 0.0, inertia_feedforward=inertia)
 
 
 def settings_of(
@@ -276,26 +230,60 @@ def settings_of(
                 yield Setting(law, "feedback", gain, deadband=deadband, inertia_feedforward=inertia)
 
 
-def picked(
-    settings: Sequence[Setting], bench: Bench, others: Bench, account: Account
-) -> tuple[Candidate | None, list[Candidate], float, float]:
-    """The setting to switch on, or None; all candidates, gains beyond its own too; its margin, and the lowest gain that
-    is not safe."""
-    candidates: list[Candidate] = []
+@dataclass(frozen=True)
+class Choice:
+    """The setting to switch on, and what it was chosen among.
+
+    Attributes
+    ----------
+    chosen : Candidate or None
+    candidates : tuple of Candidate
+        All, gains beyond the chosen one too.
+    margin, unsafe_gain : float
+        As of `Recommendation`.
+    inertia_alone, friction : Candidate or None
+        As of `Recommendation`.
+    """
+
+    chosen: Candidate | None
+    candidates: tuple[Candidate, ...]
+    margin: float = math.nan
+    unsafe_gain: float = math.inf
+    inertia_alone: Candidate | None = None
+    friction: Candidate | None = None
+
+
+def picked(settings: Sequence[Setting], bench: Bench, others: Bench, account: Account) -> Choice:
+    """What to switch on: the best that compensates friction, or the inertia feedforward alone where that is as good."""
+    tried: list[Candidate] = []
     for setting in settings:
-        candidates.append(bench.judged(setting))
-        account.tried(len(candidates))
-    chosen, rejected, unsafe = confirmed(candidates, bench, others)
-    unsafe += [c.setting for c in candidates if c.unsafe]
-    candidates = [rejected.get(c.setting, c) for c in candidates]
-    if chosen is None:
-        return None, candidates, math.nan, math.inf
-    beyond = [on_both(replace(chosen.setting, gain=gain), bench, others) for gain in BEYOND]
+        tried.append(bench.judged(setting))
+        account.tried(len(tried))
+    friction, rejected, unsafe = confirmed([c for c in tried if c.setting.compensates], bench, others)
+    alone, rejected_alone, _ = confirmed([c for c in tried if not c.setting.compensates], bench, others)
+    rejected |= rejected_alone
+    candidates = tuple(rejected.get(c.setting, c) for c in tried)
+    # Its errors on the axes of the confirmation, also where it is not to be switched on.
+    there = next((others.judged(s) for s in settings if not s.compensates), None) if friction else alone
+    if alone and not (friction and adds(friction, alone)):
+        return Choice(alone, candidates, inertia_alone=alone, friction=friction)
+    if friction is None:
+        return Choice(None, candidates)
+    unsafe += [c.setting for c in tried if c.unsafe]
+    beyond = [on_both(replace(friction.setting, gain=gain), bench, others) for gain in BEYOND]
     unsafe += [c.setting for c in beyond if c.unsafe]
-    guarded = replace(chosen.setting, gain=GUARD * chosen.setting.gain)  # it was insisted on
+    guarded = replace(friction.setting, gain=GUARD * friction.setting.gain)  # it was insisted on
     safe = [guarded, *(c.setting for c in beyond if not c.unsafe)]
-    margin, unsafe_gain = margin_of(chosen.setting, unsafe, safe)
-    return chosen, [*candidates, *beyond], margin, unsafe_gain
+    margin, unsafe_gain = margin_of(friction.setting, unsafe, safe)
+    return Choice(friction, (*candidates, *beyond), margin, unsafe_gain, there, friction)
+
+
+def adds(friction: Candidate, alone: Candidate) -> bool:
+    """Whether friction compensation leaves less than the inertia feedforward alone by more than `NEAR`, on the same
+    axes: on the worst, or on half of them and as little on the worst."""
+    if NEAR * friction.worst < alone.worst:
+        return True
+    return NEAR * friction.usual < alone.usual and friction.worst <= NEAR * alone.worst
 
 
 def alike(one: Setting, other: Setting) -> bool:
@@ -315,7 +303,7 @@ def best_of(
 ) -> Candidate | None:
     """Of the safe candidates with about the least worst error the one with the lowest gain, feedforward first; among
     those alike the one with the least `tie`."""
-    safe = [c for c in candidates if not c.unsafe and c.worst <= WORTH]
+    safe = [c for c in candidates if not c.refused]
     near = (c for c in safe if c.worst <= NEAR * min(x.worst for x in safe))
     return min(near, key=lambda c: (c.setting.kind == "feedback", c.setting.gain, tie(c)), default=None)
 
@@ -347,8 +335,8 @@ def insisted(setting: Setting, bench: Bench, others: Bench) -> tuple[Candidate, 
     final = others.judged(setting)
     if final.unsafe:
         return final, later
-    if final.worst > WORTH:
-        return replace(final, useless=f"{HARDLY}{later}"), ""
+    if final.useless:
+        return replace(final, useless=final.useless + later), ""
     if ALLOWANCE * final.worst > 1.0:
         return replace(final, useless=UNSURE + later), ""
     if (trial := others.judged(more)).unsafe:
@@ -358,7 +346,7 @@ def insisted(setting: Setting, bench: Bench, others: Bench) -> tuple[Candidate, 
 
 def with_lead(candidate: Candidate, bench: Bench) -> Candidate:
     """The candidate with the lead under which its worst error is least; the shortest of those alike."""
-    if candidate.setting.kind != "feedforward":
+    if candidate.setting.kind != "feedforward" or not candidate.setting.compensates:
         return candidate
     tried = [candidate]
     for lead in LEADS[1:]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from statistics import median
 from typing import Any
 
 from stickslip.model import Model
@@ -46,6 +45,12 @@ class Recommendation:
         What the chosen setting does at rest for long, where compensators were tried besides and it goes to and fro.
     better : float
         Times as small as simulated, that the error left may be.
+    inertia_alone : Candidate or None
+        The inertia feedforward without friction compensation on the axes that the chosen setting was not picked on, up
+        to the first on which it is not safe; None where no inertia is fed forward, or nothing is recommended.
+    friction : Candidate or None
+        The best setting that compensates friction, on the same axes; it is not the chosen one where it adds nothing to
+        the inertia feedforward alone. None where there is none.
     """
 
     chosen: Candidate | None
@@ -63,6 +68,8 @@ class Recommendation:
     beside: tuple[Beside, ...] = ()
     hunts: str = ""
     better: float = BETTER
+    inertia_alone: Candidate | None = None
+    friction: Candidate | None = None
 
     @property
     def instead(self) -> Beside | None:
@@ -89,7 +96,7 @@ class Recommendation:
     def usual_reduction(self) -> float:
         """The part of the error that is taken away at least on half of the axes that the setting was not picked on; NaN
         where it was confirmed on none."""
-        return 1.0 - median(self.chosen.errors[1:]) if self.chosen and self.confirmed_on else math.nan
+        return 1.0 - self.chosen.usual if self.chosen and self.confirmed_on else math.nan
 
     @property
     def confirmed_on(self) -> int:
@@ -110,6 +117,7 @@ class Recommendation:
             "linear_error_rms": self.linear_error, "margin": self.margin, "unsafe_gain": self.unsafe_gain,
             "reduction": list(self.reduction) if self.chosen else None, "reduction_confidence": self.confidence,
             "usual_reduction": self.usual_reduction if self.confirmed_on else None,
+            "inertia_alone": self.inertia_alone.as_dict() if self.inertia_alone else None,
             "axes": self.axes, "axes_confirmed": self.confirmed_on, "notes": list(self.notes),
             "linear_alone_rings": self.rings, "drive": self.drive.as_dict(),
             "candidates": [c.as_dict() for c in self.candidates],

@@ -12,7 +12,9 @@ from dataclasses import replace
 
 from stickslip.analyse.controller_loop import linearised
 from stickslip.analyse.presliding_loop import Loop
+from stickslip.control.controller import Controller
 from stickslip.control.own_loop import USUAL_TIME
+from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.drivetrain import Drivetrain
 from stickslip.machines.machine import Machine
@@ -53,12 +55,22 @@ def sample_time_for(
     if not period:
         return USUAL_TIME, f"assumed, as the model does not contain its record's; {OWN}"
     record = f"the record {file}" if file else "the identified record"
-    if period > USUAL_TIME and inertia:
-        # Gains do not depend on it, and a bandwidth that is too high for it is no error yet.
-        loop = replace(sampled(USUAL_TIME).loop(inertia), sample_time=period)
-        if not Loop(Drivetrain((inertia,)), linearised(loop, math.inf, MIDDLE)).sensitivity() <= WELL_DAMPED:
-            return USUAL_TIME, (
-                f"assumed: sampled every {period:.3g} s, as {record} has rows, this loop would be unstable or hardly "
-                f"damped, so that it is taken to run faster than the record was kept; {OWN}"
-            )
+    # Gains do not depend on it, and a bandwidth that is too high for it is no error yet.
+    if period > USUAL_TIME and inertia and hardly_damped(sampled(USUAL_TIME).loop(inertia), period, inertia):
+        return USUAL_TIME, (
+            f"assumed: sampled every {period:.3g} s, as {record} has rows, this loop would be unstable or hardly "
+            f"damped, so that it is taken to run faster than the record was kept; {OWN}"
+        )
     return period, f"{ROWS} {record}; {OWN}"
+
+
+def hardly_damped(loop: Controller, period: float, inertia: float) -> bool:
+    """Whether a loop on a rigid axis of this inertia, kg·m², would not be well damped at a sample time, s.
+
+    A controller that is not smooth about rest has no linear loop, and its sample time is not doubted.
+    """
+    try:
+        linear = linearised(replace(loop, sample_time=period), math.inf, MIDDLE)
+    except InputError:
+        return False
+    return not Loop(Drivetrain((inertia,)), linear).sensitivity() <= WELL_DAMPED

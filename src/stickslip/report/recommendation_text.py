@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from stickslip.control.learned import told
 from stickslip.control.registry import control_law
 from stickslip.model import Model
-from stickslip.recommend.notes import HARDLY, WORTH
-from stickslip.recommend.recommend import Candidate, Recommendation
+from stickslip.recommend.candidates import Candidate, Setting
+from stickslip.recommend.notes import ALLOWANCE
+from stickslip.recommend.recommendation import Recommendation
 
 
 def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str]:
@@ -19,8 +20,8 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
     out = [f"{'law':<16}{'structure':<13}{'gain':>5}  {deadband}  {'error left':>10}  {'worst':>7}  safe"]
     for c in result.candidates:
         x = c.setting
-        mark = "<- " if result.chosen and (x.law, x.kind, x.gain, x.deadband) == same(result.chosen) else ""
-        out.append(f"{x.law:<16}{x.kind:<13}{x.gain:>5.3g}  {x.deadband:>{wide}.3g}  {100 * c.errors[0]:>8.1f} %  "
+        mark = "<- " if result.chosen and (x.label, x.kind, x.gain, x.deadband) == same(result.chosen) else ""
+        out.append(f"{x.label:<16}{x.kind:<13}{x.gain:>5.3g}  {x.deadband:>{wide}.3g}  {100 * c.errors[0]:>8.1f} %  "
               f"{100 * c.worst:>5.1f} %  {mark}{safety(c)}")  # fmt: skip
     out.append("")
     path = result.drive.path
@@ -40,23 +41,71 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
             out.append(
                 f"{'':19}below, safe means that the compensator adds no oscillation to this one; it does not end it"
             )
+    return [*out, *chosen_lines(result, unit), *beside_lines(result), *result.notes]
+
+
+def chosen_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str]:
+    """What is switched on, and what to expect of it; nothing where no compensator is."""
     c = result.chosen
-    if c and result.model:
-        out.append(
-            f"switch on:         {c.setting.kind} of law {result.model.law.name!r}, gain {c.setting.gain:g}"
-        )
+    if c is None or result.model is None:
+        return []
+    x = c.setting
+    out = [f"switch on:         {named(x)}"]
+    if x.compensates:
         out.append(f"parameters:        {parameters(result.model, unit)}")
-        out.append(f"lead:              {c.setting.lead:.4g} s")
-        out.append(f"deadband:          {c.setting.deadband:.4g} {unit('rad/s')}")
-        inertia = c.setting.inertia_feedforward
-        said = f"{inertia:.4g} {unit('kg·m²')} times the acceleration" if inertia else "not fed forward"
-        out.append(f"inertia:           {said}")
-        out.append(f"error reduction:   {reduction(result)}")
+        out.append(f"lead:              {x.lead:.4g} s")
+        out.append(f"deadband:          {x.deadband:.4g} {unit('rad/s')}")
+    fed = f"{x.inertia_feedforward:.4g} {unit('kg·m²')} times the acceleration"
+    out.append(f"inertia:           {fed if x.inertia_feedforward else 'not fed forward'}")
+    out.append(f"error reduction:   {reduction(result)}")
+    if x.compensates:
+        out += [f"of this:           {said}" for said in without_friction(result)]
         out.append(f"gain margin:       {margin(c, result)}")
-    out += beside_lines(result)
-    for note in result.notes:
-        out.append(note)
     return out
+
+
+def named(setting: Setting) -> str:
+    """What is switched on, in words."""
+    if not setting.compensates:
+        return "inertia feedforward alone, without friction compensation"
+    return f"{setting.kind} of law {setting.law!r}, gain {setting.gain:g}"
+
+
+def without_friction(result: Recommendation) -> Iterator[str]:
+    """How much of the reduction the inertia feedforward alone gives, and friction compensation beyond it; nothing where
+    no inertia is fed forward, or no friction compensated."""
+    alone, whole = result.inertia_alone, result.chosen
+    if alone is None or whole is None or not whole.setting.compensates:
+        return
+    fed = "inertia feedforward alone" + (" with the constant torque" if alone.setting.offset else "")
+    if alone.unsafe:
+        yield (
+            f"{fed} gives {taken_away(alone.errors[0])} on the best estimate, and is not recommended without friction "
+            f"compensation ({', '.join(alone.unsafe)})"
+        )
+        return
+    half = (
+        f" and at least {taken_away(alone.usual)} on half of the sampled axes"
+        if result.confirmed_on > 1
+        else ""
+    )
+    left = [
+        with_friction / without for with_friction, without in zip(whole.errors, alone.errors, strict=True)
+    ]
+    unsure = (
+        "" if ALLOWANCE * max(left) <= 1.0
+        else f", but not surely: for what is not simulated {ALLOWANCE:g} times as much error is allowed"
+    )  # fmt: skip
+    yield (
+        f"{fed} gives {taken_away(alone.errors[0])} on the best estimate{half}; of what it leaves there, friction "
+        f"compensation takes {taken_away(left[0])}{unsure}"
+    )
+
+
+def taken_away(left: float) -> str:
+    """The part of the error that is taken away, for people; of what makes it larger 0 %."""
+    part = max(1.0 - left, 0.0)
+    return percent(part, part)
 
 
 def beside_lines(result: Recommendation) -> list[str]:
@@ -85,8 +134,7 @@ def safety(c: Candidate) -> str:
     """Whether it is safe; why it is not, or not worth it."""
     if c.unsafe:
         return f"no: {', '.join(c.unsafe)}"
-    useless = c.useless or (HARDLY if c.worst > WORTH else "")
-    return f"yes, but {useless}" if useless else "yes"
+    return f"yes, but {c.useless}" if c.useless else "yes"
 
 
 def margin(chosen: Candidate, result: Recommendation) -> str:
@@ -102,7 +150,7 @@ def margin(chosen: Candidate, result: Recommendation) -> str:
 def same(chosen: Candidate) -> tuple[str, str, float, float]:
     """What tells the row of the chosen setting: its lead was found later."""
     x = chosen.setting
-    return x.law, x.kind, x.gain, x.deadband
+    return x.label, x.kind, x.gain, x.deadband
 
 
 def reduction(result: Recommendation) -> str:

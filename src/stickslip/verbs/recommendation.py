@@ -16,7 +16,13 @@ from stickslip.identify.identified_file import Identified
 from stickslip.model import Model
 from stickslip.recommend.file import setting_table, write_setting
 from stickslip.recommend.recommend import Candidate, Recommendation
-from stickslip.report.recommendation_text import recommendation_lines, reduction, safety
+from stickslip.report.recommendation_text import (
+    named,
+    recommendation_lines,
+    reduction,
+    safety,
+    without_friction,
+)
 from stickslip.study.files import prepared_folder
 from stickslip.verbs import own_files
 
@@ -130,8 +136,7 @@ class RecommendationResult:
             return f"<RecommendationResult: {self.recommendation.instead.label}>"
         if self.chosen is None:
             return "<RecommendationResult: no compensator>"
-        x = self.chosen.setting
-        return f"<RecommendationResult: {x.kind} of law {x.law!r}, gain {x.gain:g}>"
+        return f"<RecommendationResult: {named(self.chosen.setting)}>"
 
     def _repr_html_(self) -> str:
         """A table of the candidates in a notebook, and what is recommended."""
@@ -139,7 +144,9 @@ class RecommendationResult:
         head = "".join(f"<th>{h}</th>" for h in names)
         rows = "".join(_row(c) for c in self.candidates)
         said = (
-            f"Error reduction: {reduction(self.recommendation)}"
+            "; of this, ".join(
+                [f"Error reduction: {reduction(self.recommendation)}", *without_friction(self.recommendation)]
+            )
             if self.chosen
             else "No compensator is recommended."
         )
@@ -152,5 +159,12 @@ class RecommendationResult:
 
 def _row(c: Candidate) -> str:
     x = c.setting
-    cells = (x.law, x.kind, f"{x.gain:g}", f"{100 * c.errors[0]:.1f} %", f"{100 * c.worst:.1f} %", safety(c))
+    cells = (
+        x.label,
+        x.kind,
+        f"{x.gain:g}",
+        f"{100 * c.errors[0]:.1f} %",
+        f"{100 * c.worst:.1f} %",
+        safety(c),
+    )
     return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"

@@ -151,6 +151,7 @@ def picture_data(picture: Any) -> dict[str, Any]:
 
 def recommend(request: Request, say: Said) -> dict[str, Any]:
     """Recommend a setting for a model; writes recommended.toml and result.json."""
+    from stickslip.report.recommendation_text import named
     from stickslip.verbs.recommend import recommend as run
 
     item = Item(Path(request["folder"]))
@@ -163,12 +164,11 @@ def recommend(request: Request, say: Said) -> dict[str, Any]:
     if found.chosen is not None:
         found.save(item.folder / "recommended.toml")
     unit = found.identified.unit
-    units = {"velocity": unit("rad/s"), "torque": unit("N·m")}
+    units = {"velocity": unit("rad/s"), "torque": unit("N·m"), "inertia": unit("kg·m²")}
     if found.chosen is not None:
         units |= {f.name: unit(f.par.unit) for f in found.model.law.fields}
     written_whole(item.folder / "result.json", plain({**found.as_dict(), "text": str(found), "units": units}))
-    setting = found.chosen and found.chosen.setting
-    words = f"{setting.kind} of the law {setting.law}, gain {setting.gain:g}" if setting else ""
+    words = named(found.chosen.setting) if found.chosen else ""
     return {"chosen": found.chosen is not None, "words": words}
 
 

@@ -34,11 +34,14 @@ function headline(found) {
     return h("section", { class: "verdict" }, h("h2", {}, "Switch no compensator on"), found.linear_alone_rings ? h("p", {}, found.linear_alone_rings) : "");
   }
   const c = found.chosen;
-  const numbers = [["law", found.model.law, ""], ...Object.entries(found.model).filter(([k, v]) => k !== "law" && typeof v === "number").map(([k, v]) => [k, v, unitOf(found, k)]),
-    ["gain", c.gain, ""], ["lead", c.lead, "s"], ["deadband", c.deadband, unitOf(found, "velocity")], ["offset", c.offset, unitOf(found, "torque")]].filter(([, v]) => v !== undefined);
+  const law = [["law", found.model.law, ""], ...Object.entries(found.model).filter(([k, v]) => k !== "law" && typeof v === "number").map(([k, v]) => [k, v, unitOf(found, k)]),
+    ["gain", c.gain, ""], ["lead", c.lead, "s"], ["deadband", c.deadband, unitOf(found, "velocity")]];
+  const numbers = [...(c.gain === 0 ? [] : law), ["inertia feedforward", c.inertia_feedforward, unitOf(found, "inertia")], ["offset", c.offset, unitOf(found, "torque")]].filter(([, v]) => v !== undefined);
   const [least, most] = found.reduction;
-  return h("section", { class: "verdict" }, h("h2", {}, `Switch on: ${c.kind} of the law ${found.model.law}, gain ${number(c.gain)}`),
-    h("p", { class: "big" }, `It takes ${Math.round(100 * least)} to ${Math.round(100 * most)} % of the error away, with a probability of ${Math.round(100 * found.reduction_confidence)} %.`),
+  const alone = c.gain === 0;
+  const fed = found.inertia_alone && !alone && !found.inertia_alone.unsafe.length ? ` Of this, inertia feedforward alone gives ${Math.round(100 * Math.max(1 - found.inertia_alone.errors[0], 0))} % on the best estimate.` : "";
+  return h("section", { class: "verdict" }, h("h2", {}, alone ? "Switch on: inertia feedforward alone, without friction compensation" : `Switch on: ${c.kind} of the law ${found.model.law}, gain ${number(c.gain)}`),
+    h("p", { class: "big" }, `It takes ${Math.round(100 * least)} to ${Math.round(100 * most)} % of the error away, with a probability of ${Math.round(100 * found.reduction_confidence)} %.${fed}`),
     h("ul", { class: "numbers" }, numbers.map(([name, value, unit]) => h("li", {}, `${name} `, copyable(typeof value === "number" ? number(value, 5) : value, value, name), ` ${unit}`))),
     h("p", { class: "row" }, h("a", { class: "button", href: `/api${here(`/settings/${location.hash.split("/").pop()}/toml`)}`, download: "recommended.toml" }, "Download recommended.toml")));
 }
@@ -48,8 +51,8 @@ function candidates(found) {
   const same = (c) => found.chosen && ["law", "kind", "gain", "lead", "deadband"].every((k) => c[k] === found.chosen[k]);
   return h("section", {}, h("h2", {}, "All that was tried"), h("p", { class: "hint" }, `Each on ${found.axes} axes that the data allow; errors beside the linear controller's alone.`),
     h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Candidates" }, h("table", {}, h("thead", {}, h("tr", {}, ["law", "structure", "gain", `deadband (${unitOf(found, "velocity") || "rad/s"})`, "error left", "worst", "safe, and why not"].map((t) => h("th", { scope: "col" }, t)))),
-      h("tbody", {}, found.candidates.map((c) => h("tr", { class: same(c) ? "chosen" : "" }, h("th", { scope: "row" }, c.law + (same(c) ? " (recommended)" : "")), h("td", {}, c.kind), h("td", {}, number(c.gain)), h("td", {}, number(c.deadband)),
-        h("td", {}, percent(c.errors[0])), h("td", {}, percent(Math.max(...c.errors))), h("td", { class: c.unsafe.length ? "bad text" : "good" }, c.unsafe.length ? `no: ${c.unsafe.join(", ")}` : "yes")))))));
+      h("tbody", {}, found.candidates.map((c) => h("tr", { class: same(c) ? "chosen" : "" }, h("th", { scope: "row" }, (c.gain === 0 ? "inertia alone" : c.law) + (same(c) ? " (recommended)" : "")), h("td", {}, c.kind), h("td", {}, number(c.gain)), h("td", {}, number(c.deadband)),
+        h("td", {}, percent(c.errors[0])), h("td", {}, percent(Math.max(...c.errors))), h("td", { class: c.unsafe.length ? "bad text" : "good" }, c.unsafe.length ? `no: ${c.unsafe.join(", ")}` : c.useless ? `yes, but ${c.useless}` : "yes")))))));
 }
 
 function download(setting, targets) {
