@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -24,9 +25,10 @@ from stickslip.model import Model
 from stickslip.recommend import recommend as recommending
 from stickslip.recommend.candidates import Setting
 from stickslip.recommend.recommend import Drive, recommend
+from stickslip.recommend.sample_time import hardly_damped
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.virtual import virtual_rig
-from stickslip.verbs.recommend import refuse_beside
+from stickslip.verbs.recommend import drive_with, refuse_beside
 
 T = 1e-3
 LAW = Model("coulomb", fc=0.285, sigma2=0.018)
@@ -233,3 +235,61 @@ def test_the_limit_of_a_recommendation_holds_on_a_rig(tmp_path, few):
     run = Track(compensator="recommended", model=file)
     assert run.made(virtual_rig("thesis-dry")).torque_limit == 0.6
     assert run.made(virtual_rig("thesis-dry")).encoder_counts == 0.0
+
+
+def test_a_controllers_file_without_a_sample_time_is_sampled_as_any_loop(tmp_path, monkeypatch, capsys, few):
+    """It was refused by "drive: sample_time = 0", or by a law of it that acts on samples only."""
+    monkeypatch.chdir(tmp_path)
+    Path("model.toml").write_text(MODEL)
+    Path("loop.toml").write_text(LOOPS.replace("sample_time = 1e-3", "encoder_counts = 65536"))
+    line = [
+        "recommend",
+        "model.toml",
+        "--controller",
+        "loop.toml",
+        "--amplitude",
+        "0.2",
+        "--axes",
+        "1",
+        "--json",
+    ]
+    for more, period, source in (
+        ([], 1e-3, "assumed, as the model"),
+        (["--sample-time", "5e-4"], 5e-4, "as given"),
+    ):
+        assert main([*line, "--confirm", "0", *more]) == 0
+        drive = json.loads(capsys.readouterr().out)["drive"]
+        assert drive["sample_time"] == drive["controller"]["sample_time"] == period
+        assert drive["sample_time_from"].startswith(source)
+    Path("loop.toml").write_text(LOOPS)
+    assert main([*line, "--sample-time", "5e-4"]) == 2
+    assert "--sample-time cannot be combined with --controller loop.toml" in capsys.readouterr().err
+
+
+def test_a_controller_of_continuous_time_takes_the_records_sample_time(few):
+    found = dataclasses.replace(identified(), data=({"file": "log.csv", "sample_time": 5e-4},))
+    loop = Controller(loop=LOOP, torque_limit=2.0)
+    drive = drive_with(loop, held_by, found, None, None, None)
+    assert drive.sample_time == 5e-4
+    assert drive.sample_time_from.startswith("the time between the rows of the record log.csv")
+    assert (
+        drive_with(dataclasses.replace(loop, sample_time=2e-3), held_by, found, None, None, None).sample_time
+        == 2e-3
+    )
+
+
+def held_by(made: Controller, told_by: str) -> Drive:
+    """A drive whose loop is this controller."""
+    return Drive(sample_time=made.sample_time, controller=made, amplitude=0.2, sample_time_from=told_by)
+
+
+@pytest.mark.parametrize(("period", "hardly"), [(1e-3, False), (0.03, True)])
+def test_a_loop_of_control_laws_is_doubted_at_rows_too_rare_for_it(period, hardly, monkeypatch):
+    loop = Controller(loop=LOOP, sample_time=T)
+    assert hardly_damped(loop, period, INERTIA) is hardly
+
+    def bent(*_):
+        raise ss.InputError("controller: loop is not smooth about rest")
+
+    monkeypatch.setattr("stickslip.recommend.sample_time.linearised", bent)
+    assert not hardly_damped(loop, period, INERTIA)

@@ -91,6 +91,17 @@ def read_controller(
         return composed(table, inertia, poles, {**(known or {}), **own}, laws, sample_time)
 
 
+def sample_time_in(path: str | os.PathLike[str]) -> float:
+    """The sample time that a controller's file gives, s; 0: none.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read, or has no table ``[controller]``.
+    """
+    return read_toml(Path(path)).table("controller").number("sample_time", "s", 0.0, lower=0.0)
+
+
 def composed(
     table: Table,
     inertia: float,

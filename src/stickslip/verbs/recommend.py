@@ -14,10 +14,11 @@ from stickslip.arguments import arguments_checked
 from stickslip.config import named_numbers
 from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.controller import Controller
-from stickslip.control.files import read_controller
+from stickslip.control.files import read_controller, sample_time_in
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import kind_of_loop
 from stickslip.errors import InputError, UnknownName
+from stickslip.identify.identified_file import Identified
 from stickslip.identify.motion import Motion, motion_of
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
@@ -90,8 +91,8 @@ def recommend(
         axes.
     sample_time : float, optional
         Of the drive, s; the machine's, else the time between the rows of the identified record, or 1e-3 where the model
-        does not tell it, or the loop would be hardly damped at those rows. A note says which. Refused beside
-        `controller`, which has its own.
+        does not tell it, or the loop would be hardly damped at those rows. A note says which. Refused beside a
+        `controller` that has its own.
     counts_per_rev : float, optional
         Of the encoder; 0: exact. The machine's, or 0. Of a linear axis the counts in 2π m: 2π over the scale's step
         in m, 12.57e6 for 0.5 µm.
@@ -104,7 +105,7 @@ def recommend(
     inertia : float, optional
         kg·m², where the model has none, or another one.
     feed_inertia : bool
-        Whether the inertia times the reference's acceleration is fed forward, too.
+        Whether the inertia times the reference's acceleration is fed forward, too; then it is tried alone as well.
     compensators : sequence of str
         Of the catalogue of `stickslip study compensators` (observers, adaptation, sliding modes, resets), which are
         tried besides and switched on where one leaves less; ("all",) for all of them.
@@ -137,13 +138,16 @@ def recommend(
         counts_per_rev = at_hand.encoder.counts if counts_per_rev is None else counts_per_rev
     path = None if motion is None else motion_in(motion)
     if controller is not None:
-        refuse_beside(
-            controller, loop=loop, linear=linear, bandwidth=bandwidth, damping=damping, sample_time=sample_time
-        )  # fmt: skip
-        drive = drive_with(
-            controller, inertia or found.axis.get("inertia"), counts_per_rev or 0.0, torque_limit, amplitude, frequency,
-            path,
-        )  # fmt: skip
+        refuse_beside(controller, loop=loop, linear=linear, bandwidth=bandwidth, damping=damping)
+
+        def holding(made: Controller, told_by: str) -> Drive:
+            return Drive(
+                sample_time=made.sample_time, encoder_counts=counts_per_rev or made.encoder_counts,
+                torque_limit=torque_limit, amplitude=amplitude, frequency=frequency or 0.5, motion=path,
+                controller=made, sample_time_from=told_by,
+            )  # fmt: skip
+
+        drive = drive_with(controller, holding, found, inertia, sample_time, at_hand)
     else:
         gains, corner, limit = own_loop(loop, torque_limit)
 
@@ -253,21 +257,40 @@ def compensators_of(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def drive_with(
-    controller: Controller | str | os.PathLike[str], inertia: float | None, counts: float, limit: float,
-    amplitude: float | None, frequency: float | None, motion: Motion | None,
+    controller: Controller | str | os.PathLike[str], holding: Callable[[Controller, str], Drive], found: Identified,
+    inertia: float | None, sample_time: float | None, machine: Machine | None,
 ) -> Drive:  # fmt: skip
-    """The drive whose loop is made of control laws; sample time, limit and counts are the controller's.
+    """The drive whose loop is made of control laws: at the controller's sample time, else as any loop is sampled.
+
+    Parameters
+    ----------
+    controller : Controller or path
+    holding : callable
+        The drive that holds a controller with a sample time, and where that is from.
+    found : Identified
+    inertia : float, optional
+        kg·m², where the model has none, or another one.
+    sample_time : float, optional
+        That was given, s; refused where the controller has its own.
+    machine : Machine, optional
+        At hand.
 
     Raises
     ------
     InputError
     """
-    made = controller if isinstance(controller, Controller) else read_controller(Path(controller), inertia)
-    return Drive(
-        sample_time=made.sample_time, encoder_counts=counts or made.encoder_counts, torque_limit=limit,
-        amplitude=amplitude, frequency=frequency or 0.5, motion=motion, controller=made,
-        sample_time_from="that of the controller",
-    )  # fmt: skip
+    known = inertia or found.axis.get("inertia")
+
+    def sampled(period: float, told_by: str = "") -> Drive:
+        if isinstance(controller, Controller):
+            return holding(replace(controller, sample_time=period), told_by)
+        return holding(read_controller(Path(controller), known, sample_time=period), told_by)
+
+    own = controller.sample_time if isinstance(controller, Controller) else sample_time_in(controller)
+    if own > 0.0:
+        refuse_beside(controller, sample_time=sample_time)
+        return sampled(own, "that of the controller")
+    return sampled(*sample_time_for(found, sample_time, machine, sampled, known))
 
 
 def own_loop(
