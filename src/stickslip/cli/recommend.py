@@ -8,12 +8,13 @@ stickslip recommend model.toml --loop kv=40,kvp=0.8,kvi=25,feed=1,filter=300,lim
 stickslip recommend model.toml --bandwidth 15 --compensators all
 stickslip recommend model.toml --loop kp=8,ki=60,kd=0.08,kr=0.08,limit=3 --motion cycle.csv
 
-Simulates the linear controller alone (the given loop, or PD or PID by pole placement) and every candidate (law,
-feedforward or feedback, gain, dead band) on the best estimate and on axes sampled from the model's intervals. The
-motion is that of the log, or a given one, followed by a standstill; sampling is that of the drive. The recommended
-candidate has a limit cycle on none of these axes; of those within a tenth of the smallest error on the worst axis, it
-is the one with the lowest gain. It is then simulated on further sampled axes; the error reduction printed is the one
-found there.
+Simulates the linear controller alone (the given loop, or PD or PID by pole placement) and every candidate (inertia
+feedforward alone; law, feedforward or feedback, gain, dead band) on the best estimate and on axes sampled from the
+model's intervals. The motion is that of the log, or a given one, followed by a standstill; sampling is that of the
+drive. The recommended candidate has a limit cycle on none of these axes; of those within a tenth of the smallest error
+on the worst axis, it is the one with the lowest gain; where friction compensation takes less than a tenth of what the
+inertia feedforward alone leaves, it is that alone. It is then simulated on further sampled axes; the error reduction
+printed is the one found there.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ def drive_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="S",
         help="sample time of the drive (default the machine's, else the time between rows of the identified "
-        "record, or 0.001 where the loop would be hardly damped at those)",
+        "record, or 0.001 where the loop would be hardly damped at those; a --controller file may set it)",
     )
     parser.add_argument(
         "--counts-per-rev",
@@ -122,7 +123,7 @@ def search_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--no-inertia-feedforward", dest="feed_inertia", action="store_false",
-        help="omit the inertia feedforward",
+        help="simulate and recommend without inertia feedforward, as for a drive that feeds no acceleration forward",
     )  # fmt: skip
     parser.add_argument(
         "--compensators", metavar="NAMES",
