@@ -17,7 +17,7 @@ from stickslip.export._sliding import Curve
 from stickslip.friction_levels import bends_of, independent, levels_of, static_level
 from stickslip.model import Model
 from stickslip.recommend.candidates import breakaway
-from stickslip.recommend.recommend import laws_of
+from stickslip.recommend.question import laws_of
 from stickslip.spec import Surroundings
 
 INERTIA = 4e-4

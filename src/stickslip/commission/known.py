@@ -21,7 +21,8 @@ from stickslip.machines.motor import Amplifier
 from stickslip.model import Model
 from stickslip.recommend.candidate_run import Drive
 from stickslip.recommend.plant import WholeMachine
-from stickslip.recommend.recommend import laws_of, recommend_on
+from stickslip.recommend.question import laws_of
+from stickslip.recommend.recommend import recommend_on
 from stickslip.recommend.recommendation import Recommendation
 from stickslip.record import Record, encoder_step
 from stickslip.rigs.procedures.moves import ROOM
