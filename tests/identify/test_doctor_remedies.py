@@ -150,3 +150,23 @@ def test_a_coulomb_torque_that_does_not_show_is_not_quoted():
     torque = 40.0 * q + 0.02 + np.random.default_rng(3).normal(0.0, 5e-4, t.size)
     found = examine(Record(t, {"position": q, "motor_torque": torque}, UNITS)).findings
     assert not any("Coulomb" in f.message for f in found if f.code == "offset")
+
+
+@pytest.mark.parametrize("unit", ["1/s", "Units", "user units"])
+def test_a_unit_that_is_stated_and_not_known_is_asked_for(tmp_path, unit):
+    """Revolutions a second were taken as radians: inertia and viscous friction 6.28 times too large, identified."""
+    x = log()
+    velocity = np.gradient(x["q"], x["t"])
+    path = written(
+        tmp_path / "log.csv", **{"Time [s]": x["t"], f"Speed act [{unit}]": velocity, "Torque [Nm]": x["tau"]}
+    )
+    (found,) = ss.doctor(path).errors
+    assert found.code == "unknown-unit"
+    assert f"velocity=Speed act [{unit}]:rev/s" in found.remedy
+    assert not ss.doctor(path, map={"velocity": f"Speed act [{unit}]:rad/s"}).errors
+
+
+def test_an_axis_in_brackets_is_no_unit(tmp_path):
+    x = log()
+    path = written(tmp_path / "log.csv", **{"t": x["t"], "position[0]": x["q"], "effort[0]": x["tau"]})
+    assert not ss.doctor(path).errors

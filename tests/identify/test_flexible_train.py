@@ -46,6 +46,8 @@ def test_a_load_that_swings_behind_a_belt_does_not_count_as_more_inertia(frequen
     assert train.motor_share == pytest.approx(share, abs=0.05)
     (said,) = on_swing(found)
     assert f"resonance at {train.resonance:.3g} Hz" in said
+    (unsure,) = on_swing(replace(found, bands=found.bands[:1]))
+    assert "this record does not tell which" in unsure
     # What the swing adds to the torque is no error of the law.
     assert found.left_by(found.own) < 2.0 * found.bands[0].misfit
 

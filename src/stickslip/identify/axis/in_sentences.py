@@ -40,8 +40,9 @@ def on_width(found: Regression | None) -> list[str]:
     if found is None or found.widened == 1.0:
         return []
     return [
-        f"Faster than {found.bands[0].corner:.2g} Hz the axis does not move as one inertia (play that opens while it "
-        f"slides, a train that rings): inertia and friction are those of slower motion."
+        f"Faster than {found.bands[0].corner:.2g} Hz the torque is not that of one inertia (play that opens while the "
+        "axis slides, a train that rings, a torque that is filtered, torque over the position): inertia and friction "
+        "are those of slower motion."
     ]
 
 
@@ -52,18 +53,19 @@ def on_swing(found: Regression | None) -> list[str]:
     if found is None or not swings:
         return []
     swing = statistics.median(swings)
-    if swing < 0.0:
-        told, at = found.two_inertias, f"at about {Swing(swing, 0.0, 0.0).antiresonance:.2g} Hz"
-        if told is not None:
-            (low, high), (least, most) = told.antiresonance_interval, told.motor_share_interval
-            at = (
-                f"at {told.antiresonance:.3g} Hz [{low:.3g}, {high:.3g}] (antiresonance), resonance at "
-                f"{told.resonance:.3g} Hz, the motor has {told.motor_share:.2g} [{least:.2g}, {most:.2g}] of the "
-                "inertia"
-            )
+    if told := found.two_inertias:
+        (low, high), (least, most) = told.antiresonance_interval, told.motor_share_interval
         return [
-            f"Motor and load do not move as one: with the motor held the load swings {at}; this is allowed for, and "
-            "the inertia is that of both."
+            f"Motor and load do not move as one: with the motor held the load swings at {told.antiresonance:.3g} Hz "
+            f"[{low:.3g}, {high:.3g}] (antiresonance), resonance at {told.resonance:.3g} Hz, the motor has "
+            f"{told.motor_share:.2g} [{least:.2g}, {most:.2g}] of the inertia; this is allowed for, and the inertia is "
+            "that of both."
+        ]
+    if swing < 0.0:
+        return [
+            "The torque is not that of one rigid inertia: a load behind a spring would swing at about "
+            f"{Swing(swing, 0.0, 0.0).antiresonance:.2g} Hz with the motor held; rows far apart and uneven times look "
+            "like it as well, and this record does not tell which. It is allowed for, and the inertia is the whole."
         ]
     return [
         f"The torque column lags as behind a filter of about {1e3 * math.sqrt(2.0 * swing):.2g} ms; this is allowed "

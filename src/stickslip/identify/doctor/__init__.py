@@ -40,7 +40,7 @@ FINAL = ("too-short", "no-clock")
 ERRORS = (
     *FINAL, "ambiguous-column", "backward-time", "duplicate-time", "missing-column", "mixed-units", "nan",
     "never-moved", "no-torque", "position-reference-unit", "position-unit", "position-wrap", "time-unit", "torque-sign",
-    "torque-magnitude", "torque-unit", "velocity-mismatch", "velocity-sign", "velocity-unit",
+    "torque-magnitude", "torque-unit", "unknown-unit", "velocity-mismatch", "velocity-sign", "velocity-unit",
 )  # fmt: skip
 """Codes of what may make a record unusable, those of its reading among them."""
 FIRST: tuple[Callable[[View], Iterator[Finding]], ...] = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -13,6 +14,14 @@ from stickslip.identify.doctor.view import Array, View
 
 DEG, REV, RPM = math.pi / 180.0, 2.0 * math.pi, 2.0 * math.pi / 60.0
 POSITION = {"deg": DEG, "rev": REV, "mm": 1e-3, "um": 1e-6}
+IN_BRACKETS = re.compile(r"\[\s*([^\]]*[^\]\s\d][^\]]+?)\s*\]")
+"""What a column's name states as its unit: not an axis' number or letter."""
+AMBIGUOUS = dict.fromkeys(
+    ("1/s", "s-1", "1/sec"), "revolutions a second in some drives' tools and radians in others"
+)
+LIKELY = {
+    "time": "ms", "position": "rev", "velocity": "rev/s", "motor_torque": "Nm", "friction_torque": "Nm", "current": "A",
+}  # fmt: skip
 VELOCITY = {"deg/s": DEG, "rpm": RPM, "rev/s": REV, "mm/s": 1e-3, "mm/min": 1e-3 / 60}
 TIME = {"ms": 1e-3, "us": 1e-6}
 LINEAR_ONLY = ("mm", "um", "mm/s", "mm/min")
@@ -33,6 +42,12 @@ def assumed(view: View) -> Iterator[Finding]:
     """Units that nobody states."""
     main = ("time", "position", "velocity", "motor_torque", "friction_torque", "current")
     quiet = [c for c in main if not view.stated(c)]
+    for channel in quiet:
+        if match := IN_BRACKETS.search(view.name(channel)):
+            which = AMBIGUOUS.get(match[1].lower(), "which is none that is known")
+            message = f"{view.name(channel)!r} is in {match[1]!r}, {which}"
+            remedy = f"say which it is, such as {view.mapped(channel, LIKELY[channel])}"
+            yield Finding("error", "unknown-unit", message, remedy=remedy)
     if quiet:
         listed = ", ".join(
             f"{view.name(c)!r} as {c} in {'s' if c == 'time' else view.record.units[c]}" for c in quiet
