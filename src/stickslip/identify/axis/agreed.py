@@ -33,6 +33,7 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identify.regression.narrow import LATE_FALL, SMOOTHED, falls_late, smoothed_by
 from stickslip.identify.regression.regression import QUANTILE, Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
 from stickslip.identify.regression.strokes import stacked
@@ -240,7 +241,8 @@ def told_apart(
     One band of frequencies alone tells inertia or level (on tuning steps 8 of 19 such levels held, 17 of 26 inertias),
     and the plain inverse dynamics, which has a band of its own, does not second it; or the slope where motor and load
     move apart; the level is extrapolated, or its value had to be moved far towards another method's; or friction rises
-    with velocity in another form. A law that means others by these names has its friction from the prediction error.
+    with velocity in another form, or falls up to the highest speeds; or the column of the torque is smoothed for too
+    long. A law that means others by these names has its friction from the prediction error.
     """
     of_law = told_with(model, found)
     (low, high), own = found.interval("fc"), found.numbers["fc"].value
@@ -254,6 +256,10 @@ def told_apart(
         name = e.name.removesuffix(NEGATIVE)
         if found.creep.steady and name in ("fc", "sigma2"):
             return OTHER_FORM
+        if name in ("inertia", "sigma2") and (lag := smoothed_by(found.bands)):
+            return SMOOTHED.format(lag=1e3 * lag)
+        if of_law and found.shows_a_fall and falls_late(name, found.vs, found.fastest):
+            return LATE_FALL
         if bend and of_law and name in LEVELS:
             return BENT.format(how="faster" if bend > 0.0 else "more slowly", share=min(abs(bend), 1.0))
         alone = clear.get(name) and not found.confirmed(name) and not seconded(e, found, inverse)

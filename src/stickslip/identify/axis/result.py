@@ -25,11 +25,12 @@ from stickslip.identify.evidence import within_speeds
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import told_by
 from stickslip.identify.fit.parameter_vector import Vector
+from stickslip.identify.fit.smooth import root_mean_square
 from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.identify.regression.bands import GAUSSIAN
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.regression.regression import NOT_AS_ONE, Regression, root_mean_square
+from stickslip.identify.regression.regression import NOT_AS_ONE, Regression
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model

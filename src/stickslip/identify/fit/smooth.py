@@ -112,3 +112,8 @@ def seen_at(series: Array, weights: Array, places: Rows) -> Array:
     count = max(1, GATHERED // weights.size)
     parts = [frames[places[i : i + count]] @ weights for i in range(0, places.size, count)]
     return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def root_mean_square(x: Array) -> float:
+    """Of a series."""
+    return float(np.sqrt(np.mean(x * x)))

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.experiment import Experiment, insist_on_motion
-from stickslip.identify.fit.smooth import Window
+from stickslip.identify.fit.smooth import Window, root_mean_square
 from stickslip.identify.regression.band_fit import EACH_WAY, BandFit
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.bands import USUALLY, WEIGHT, decided, in_bands, rough
@@ -395,8 +395,3 @@ def regress_axis(
         seen.rows, seen.widened, seen.creep, each_way, rebuilt_within(whole, numbers["skew"].value, weight),
         seen.perhaps,
     )  # fmt: skip
-
-
-def root_mean_square(x: Array) -> float:
-    """Of a series."""
-    return float(np.sqrt(np.mean(x * x)))
