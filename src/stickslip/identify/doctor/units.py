@@ -16,7 +16,7 @@ DEG, REV, RPM = math.pi / 180.0, 2.0 * math.pi, 2.0 * math.pi / 60.0
 POSITION = {"deg": DEG, "rev": REV, "mm": 1e-3, "um": 1e-6}
 IN_BRACKETS = re.compile(r"\[\s*([^\]]*[^\]\s\d][^\]]+?)\s*\]")
 """What a column's name states as its unit: not an axis' number or letter."""
-AMBIGUOUS = dict.fromkeys(
+AMBIGUOUS: dict[str, str] = dict.fromkeys(
     ("1/s", "s-1", "1/sec"), "revolutions a second in some drives' tools and radians in others"
 )
 LIKELY = {

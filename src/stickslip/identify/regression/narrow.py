@@ -15,7 +15,7 @@ on (3 to 21 % too low)."""
 SMOOTHED = "the torque column is smoothed by about {lag:.2g} ms, longer than sliding can allow for; log it unfiltered"
 LATE = {"fc": 0.3, "sigma2": 0.15}
 """Part of the highest speed that the velocity of friction's fall may reach, for the level and the slope behind it: of
-54 slopes beside a slower fall 48 hold, of eight beside others one."""
+74 slopes beside a slower fall 66 hold, of 16 beside others three."""
 LATE_FALL = (
     "friction still falls at speeds near the highest recorded, so that fall, level and slope are not distinguished; "
     "record faster moves"
