@@ -11,7 +11,7 @@ import pytest
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.smooth import Window, seen
 from stickslip.identify.regression.regression import regress_axis
-from stickslip.identify.regression.sliding_rows import Signals, SlidingRows
+from stickslip.identify.regression.sliding_rows import Logged, Signals, SlidingRows
 from stickslip.machines.servo import ServoAxis
 
 
@@ -82,7 +82,9 @@ def seen_rows(drive: np.ndarray, width: float) -> SlidingRows:
     """Every tenth row of a torque column, seen through one window."""
     none = np.zeros(0)
     time = np.arange(drive.size) * ROW
-    signals = Signals(time, none, drive, 0.0, np.ones(drive.size, dtype=np.bool_), 0.0, 0.0)
+    signals = Signals(
+        time, none, drive, 0.0, np.ones(drive.size, dtype=np.bool_), 0.0, 0.0, Logged(time, none, drive)
+    )
     places = np.arange(100, drive.size - 100, 10)
     speed = np.zeros(places.size)
     return SlidingRows(time[places], none, speed, none, none, none, none, places, signals, Window(width, ROW), places,

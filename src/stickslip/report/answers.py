@@ -34,6 +34,12 @@ ROUGH = 0.1
 """Of the torque in gross sliding: what a model misses at most for its form to be taken as right."""
 UNEVEN = 0.03
 """Of friction's level: a constant torque from which on it may be worth two levels."""
+AMPLITUDE = 0.02
+"""Part of friction's level that a torque over the position must be for it to be told. What the form of a law leaves
+repeats with the motion, and so over the position: of 43 orders that no machine had, found beside whole turns in 144
+logs with cogging (`benchmarks/ordinary_logs.py`), 39 were smaller, and none of 256 that were there."""
+MOST_NAMED = 4
+"""Orders that one may be as well."""
 OWN_WORDS = {
     "fc": "Coulomb torque", "fs": "static (break-away) torque", "fs_positive": "break-away torque, v > 0",
     "stiffness": "stiffness at rest", "fs_negative": "break-away torque, v < 0",
@@ -260,20 +266,44 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
         out.append(
             f"The loop, simulated with the model, makes a drive signal {percent(off)} off the recorded one."
         )
-    if isinstance(regression, Regression) and regression.orders:
-        turn = 1.0 if linear(found) else 2.0 * math.pi
-        per = "a metre" if linear(found) else "a revolution"
-        listed = ", ".join(
-            f"{quantity(float(a), unit)} at {turn * o:.3g} {per}"
-            for o, a in zip(regression.orders, regression.harmonics, strict=True)
-        )
-        out.append(
-            f"Torque over the position (cogging, unbalance), allowed for but not part of the law: {listed}."
-        )
+    if isinstance(regression, Regression):
+        out += around(regression, found)
     if (rms := found.misfit.get("rms_N" if linear(found) else "rms_Nm")) is not None:
         what = f"{'force' if linear(found) else 'torque'}: {quantity(float(rms), unit_in(found, 'N·m'))}"
         out.append(f"What the curve leaves of the {what} root mean square.")
     return out
+
+
+def around(regression: Regression, found: Identification) -> list[str]:
+    """The torque over the position that is told, in a sentence; nothing where none is."""
+    turn, per = (1.0, "a metre") if linear(found) else (2.0 * math.pi, "a revolution")
+    listed = [
+        f"{quantity(size, unit_in(found, 'N·m'))} at {turn * order:.3g} {per}{or_else(turn, alike)}"
+        for order, size, alike in orders_told(regression)
+    ]
+    if not listed:
+        return []
+    return [
+        f"Torque over the position (cogging, unbalance), allowed for but not part of the law: {', '.join(listed)}."
+    ]
+
+
+def orders_told(regression: Regression) -> list[tuple[float, float, tuple[float, ...]]]:
+    """Of the orders found those that are more than the form of a law leaves: cycles a radian (m), amplitude in N·m
+    (N), and the orders that each may be as well."""
+    found = zip(regression.orders, regression.harmonics.tolist(), regression.alike, strict=True)
+    return [(order, size, alike) for order, size, alike in found if size > AMPLITUDE * regression.friction]
+
+
+def or_else(turn: float, alike: Sequence[float]) -> str:
+    """Which orders it may be as well, and what would tell."""
+    if not alike:
+        return ""
+    named = [f"{turn * order:.3g}" for order in sorted(alike)[:MOST_NAMED]]
+    more = " and others" if len(alike) > MOST_NAMED else ""
+    return (
+        f" (the record does not tell it from {', '.join(named)}{more}; record slow turns at constant speed)"
+    )
 
 
 def either_way(found: Identification) -> list[str]:

@@ -21,7 +21,7 @@ from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.creeping import FAR, NOWHERE, Creep, creep_of, steady_lack
 from stickslip.identify.regression.flexible import GIVES, HARDLY, SWINGS, Train, swings_alike
 from stickslip.identify.regression.number import QUANTILE, Number
-from stickslip.identify.regression.orders import candidate_orders, goes_round, shown_orders
+from stickslip.identify.regression.orders import Shown, candidate_orders, goes_round, shown_orders
 from stickslip.identify.regression.rebuilding import rebuilding_way
 from stickslip.identify.regression.sliding_rows import FEWEST, Fall, Signals, SlidingRows, sliding_rows
 from stickslip.identify.regression.strokes import stacked
@@ -81,6 +81,8 @@ class Bands:
         The fits beside a drift of friction that may be there, but is not told.
     train : Train
         What is taken to move.
+    alike : tuple of tuple of float
+        Of each of the orders, those it may be as well.
     """
 
     fits: tuple[BandFit, ...]
@@ -90,6 +92,7 @@ class Bands:
     creep: Creep = NOWHERE
     perhaps: tuple[BandFit, ...] = ()
     train: Train = Train.RIGID
+    alike: tuple[tuple[float, ...], ...] = ()
 
     @property
     def drifts(self) -> bool:
@@ -230,8 +233,9 @@ def in_widest(
     start = clear_skew(signals, width) if known is None else known
     rows, falls, creep, steady = rows_of(signals, width, start, exponents, FAR[axis.motion])
     chosen: dict[str, Any] = {**options, "start": start}
+    shown = shown_in(rows, falls, axis, period, chosen) if harmonics else []
     if harmonics:
-        chosen |= orders_in(rows, falls, axis, period, chosen)
+        chosen |= orders_in(rows, axis, period, shown)
     orders: tuple[float, ...] = tuple(chosen.get("orders", ()))
     # A weight, and other torques over the position, are not in what slow rows are held against.
     if steady is not NOWHERE and axis.gravity != "pendulum" and not orders:
@@ -239,7 +243,8 @@ def in_widest(
     found, train, stiffer = fit_band(rows, falls, **chosen), options.get("train", Train.RIGID), None
     if "train" not in options:
         found, train, stiffer = freed(found, lambda train: fit_band(rows, falls, **chosen, train=train))
-    seen = Bands((found,), tuple(rows), orders, creep=creep, train=train)
+    alike = tuple(s.alike for s in shown)
+    seen = Bands((found,), tuple(rows), orders, creep=creep, train=train, alike=alike)
     return Widest(seen, {**chosen, "train": train}, stiffer)
 
 
@@ -270,21 +275,37 @@ def decided(found: Bands, none: Bands) -> Bands:
     return replace(found, fits=(*found.fits, *none.fits))
 
 
-def orders_in(
+def shown_in(
     rows: Sequence[SlidingRows], falls: Sequence[Fall], axis: ServoAxis, period: float | None,
     options: Mapping[str, Any],
-) -> dict[str, Any]:  # fmt: skip
-    """Orders of a torque over the position that show, and the lowest others, which may be there but are small."""
+) -> list[Shown]:  # fmt: skip
+    """Orders of a torque over the position that show."""
     skew = fit_band(rows, falls, **options).numbers["skew"].value
-    candidates = candidate_orders(rows, axis.motion == "rotary", period)
-    own = WEIGHT if axis.gravity == "pendulum" else ()
-    candidates = candidates[len(own) :]  # the first is a pendulum's own
     curve = [k for k, fall in enumerate(falls) if fall.exponent in GAUSSIAN][::CURVE]
-    shown = shown_orders(rows, skew, candidates, curve, own, options.get("drifting", False))
+    candidates = orders_tried(rows, axis, period)
+    return shown_orders(rows, skew, candidates, curve, own_of(axis), options.get("drifting", False))
+
+
+def orders_in(
+    rows: Sequence[SlidingRows], axis: ServoAxis, period: float | None, shown: Sequence[Shown]
+) -> dict[str, Any]:
+    """Those that show, and the lowest others, which may be there but are small."""
+    orders = [s.order for s in shown]
     return {
-        "orders": shown, "background": [o for o in candidates[:BACKGROUND] if o not in shown],
+        "orders": orders,
+        "background": [o for o in orders_tried(rows, axis, period)[:BACKGROUND] if o not in orders],
         "blurred": not goes_round(rows, axis.motion == "rotary", period),
-    }  # fmt: skip
+    }
+
+
+def own_of(axis: ServoAxis) -> Sequence[float]:
+    """Orders that are there in any case, cycles a radian: a pendulum's weight."""
+    return WEIGHT if axis.gravity == "pendulum" else ()
+
+
+def orders_tried(rows: Sequence[SlidingRows], axis: ServoAxis, period: float | None) -> list[float]:
+    """The others, cycles a radian (m): the first is a pendulum's own."""
+    return candidate_orders(rows, axis.motion == "rotary", period)[len(own_of(axis)) :]
 
 
 def clear_skew(signals: Sequence[Signals], width: float) -> float:

@@ -2,29 +2,41 @@
 
 Orders are taken one by one, the one that explains most first (orthogonal matching pursuit, ``pati1993``), as long as
 what it explains is more than chance would among so many, and helps on the half of the record that it was not fitted to.
+Where others explain about as much, the rows as they were logged tell which it is (`rivals`), if any do.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from stickslip.identify.regression.drifting import drift_columns
+from stickslip.identify.regression.rivals import APART, told_as_logged
 from stickslip.identify.regression.sliding_rows import SlidingRows
 from stickslip.identify.regression.strokes import PIECE, memory_of, pieces_of, rows_in, stacked, strokes_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+class Shown(NamedTuple):
+    """An order that shows, cycles a radian (m), and those it may be as well."""
+
+    order: float
+    alike: tuple[float, ...]
+
 
 MOST = 8
 HIGHEST_ORDER, PARTS = 60, 40
 WHOLE_TURN = 0.5
 """Of a turn, from which on orders are whole numbers a turn; below, halves of the way travelled: here both lie as
 densely."""
+HIDDEN = 0.5
+"""Squares of cosine and sine together, on average (1 where nothing hides them), below which windows hide a wave."""
 OWN = 0.05
 """Part of a harmonic that no other column explains, at least."""
 SURE = 8.0
@@ -75,7 +87,7 @@ def way_of(records: Sequence[SlidingRows]) -> float:
 def shown_orders(
     records: Sequence[SlidingRows], skew: float, candidates: Sequence[float], falls: Sequence[int],
     known: Sequence[float] = (), drifting: bool = False,
-) -> list[float]:  # fmt: skip
+) -> list[Shown]:  # fmt: skip
     """Those of the candidates that the records show, the largest first.
 
     Parameters
@@ -111,18 +123,29 @@ def shown_orders(
         pool[order] = Harmonic.of(rows_of(order), basis, residual)
     stroke = strokes_of(records)
     piece = pieces_of(stroke, rows_in(PIECE, records))
-    found: list[float] = []
+    found: list[Shown] = []
+    # Where neighbours are half a cycle apart over the way, several make up one order between them, and none is it.
+    whole = way_of(records) * float(np.diff(candidates[:2])[0]) > WHOLE_TURN
+    least = 2.0 * math.log(len(candidates)) + SURE
     while len(found) < MOST and pool:
         power = float(residual @ residual)
         explained, order = max((h.explained, o) for o, h in pool.items())
         independent = torque.size / memory_of(residual, stroke)
-        if power <= 0.0 or independent * explained / power < 2.0 * math.log(len(candidates)) + SURE:
+        if power <= 0.0 or independent * explained / power < least:
             break
+        alike: Sequence[float] = ()
+        if whole:
+            alike = rivals_of(order, pool, rows_of, basis, residual, power / independent, least)
         rows = rows_of(order)
+        if alike and pool[order].size < HIDDEN * torque.size:
+            # Of what is hidden the windows tell so little that none is out.
+            hidden = [o for o, h in pool.items() if o != order and h.size < HIDDEN * torque.size]
+            order, alike = told_as_logged(records, torque - residual, [order, *hidden])
+            explained, rows = pool[order].explained, rows_of(order)
         own = rows - basis @ (basis.T @ rows)
         if held_out_power(own, residual, piece % 2 == 0) > power - HELPS * explained:
             break
-        found.append(order)
+        found.append(Shown(order, tuple(alike)))
         del pool[order]
         added: Array = np.asarray(np.linalg.qr(own)[0], dtype=np.float64)
         basis = np.asarray(np.column_stack([basis, added]), dtype=np.float64)
@@ -130,6 +153,38 @@ def shown_orders(
         if len(found) < MOST:
             for other, harmonic in pool.items():
                 pool[other] = harmonic.beside(rows_of(other), added, residual)
+    return found
+
+
+def rivals_of(
+    order: float, pool: Mapping[float, Harmonic], rows_of: Callable[[float], Array], basis: Array, residual: Array,
+    noise: float, least: float,
+) -> list[float]:  # fmt: skip
+    """The others that explain about as much of the residual, and beside which this order shows no longer.
+
+    Parameters
+    ----------
+    order : float
+        Cycles a radian (m).
+    pool : mapping of float to Harmonic
+        All that are tried.
+    rows_of : callable
+        Cosine and sine of an order at every row, shape (n, 2).
+    basis, residual : array, shape (n, k), (n,)
+    noise : float
+        Power of the residual that an order explains by chance, one degree of freedom's.
+    least : float
+        What one must explain to show, in such powers.
+    """
+    found: list[float] = []
+    for other, harmonic in pool.items():
+        if other == order or harmonic.explained < pool[order].explained - APART * noise:
+            continue
+        rows = rows_of(other)
+        added: Array = np.asarray(np.linalg.qr(rows - basis @ (basis.T @ rows))[0], dtype=np.float64)
+        left = residual - added @ (added.T @ residual)
+        if pool[order].beside(rows_of(order), added, left).explained < least * noise:
+            found.append(other)
     return found
 
 
@@ -166,6 +221,11 @@ class Harmonic:
         """The same with orthonormal columns added to the basis, and another residual."""
         mixing: Array = np.asarray(added.T @ rows)
         return replace(self, own=self.own - mixing.T @ mixing, seen=rows.T @ residual)
+
+    @property
+    def size(self) -> float:
+        """Sum of its squares: as many as there are rows where windows hide none of it."""
+        return float(np.trace(self.products))
 
     @property
     def explained(self) -> float:

@@ -29,7 +29,7 @@ from stickslip.identify.regression.drifted import calm_beside_drift
 from stickslip.identify.regression.drifting import DRIFTS, drift_torque
 from stickslip.identify.regression.falls import Falling, fall_of
 from stickslip.identify.regression.flexible import train_torque, two_inertias
-from stickslip.identify.regression.number import QUANTILE, Number
+from stickslip.identify.regression.number import QUANTILE, Number, root_mean_square
 from stickslip.identify.regression.orders import without_waves
 from stickslip.identify.regression.rebuilding import rebuilt_within
 from stickslip.identify.regression.sliding_rows import (
@@ -135,6 +135,8 @@ class Regression:
         too, ``fc``, ``sigma2`` and ``fs`` the means of both.
     perhaps : tuple of BandFit
         The fits beside a drift of friction that may be there, but is not told.
+    alike : tuple of tuple of float
+        Of each of the orders, those that it may be as well: the record does not tell them apart.
     """
 
     numbers: dict[str, Number]
@@ -151,6 +153,7 @@ class Regression:
     each_way: bool = False
     rebuilt: float = math.inf
     perhaps: tuple[BandFit, ...] = ()
+    alike: tuple[tuple[float, ...], ...] = ()
 
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval of a number."""
@@ -393,5 +396,5 @@ def regress_axis(
     return Regression(
         numbers, bands, seen.orders, falls, falling, float(np.quantile(speed, 0.01)), float(np.max(speed)), period,
         seen.rows, seen.widened, seen.creep, each_way, rebuilt_within(whole, numbers["skew"].value, weight),
-        seen.perhaps,
+        seen.perhaps, seen.alike,
     )  # fmt: skip

@@ -53,6 +53,14 @@ class Fall(NamedTuple):
         return np.asarray(np.exp(-np.minimum(power, VANISHED)), dtype=np.float64)
 
 
+class Logged(NamedTuple):
+    """The rows of a record as they were logged: times, positions and drive torques, s, rad (m), N·m (N)."""
+
+    time: Array
+    position: Array
+    drive: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Signals:
     """An experiment on a regular grid, without gaps: what the windows look at.
@@ -69,6 +77,8 @@ class Signals:
         Standard deviation of the position's white part, rad (m).
     origin : float
         What was taken off the position, rad (m).
+    logged : Logged
+        The same before it was laid on the grid, positions from the record's own zero.
     count : float
         What the column of the torque is rounded to, N·m (N); 0 where it is to nothing that shows.
     """
@@ -80,6 +90,7 @@ class Signals:
     rows: np.ndarray[Any, np.dtype[np.bool_]]
     noise: float
     origin: float
+    logged: Logged
     count: float = 0.0
 
     @property
@@ -102,7 +113,9 @@ def signals_of(experiment: Experiment, axis: ServoAxis) -> Signals:
     noise = math.sqrt(white_noise(q, rate) * rate / 2.0)
     count = gain * float(np.median(supply)) * encoder_step(experiment.signal())
     sliding = np.asarray(rows, dtype=np.bool_)
-    return Signals(t, q - q[0], gain * supply * u, loss, sliding, noise, float(q[0]), count)
+    held = 1.0 if experiment.supply is None else experiment.supply
+    logged = Logged(experiment.time, experiment.position, gain * held * experiment.signal())
+    return Signals(t, q - q[0], gain * supply * u, loss, sliding, noise, float(q[0]), logged, count)
 
 
 def narrowest_width(signals: Signals) -> float:
