@@ -12,12 +12,15 @@ import pytest
 
 from stickslip import plugins
 from stickslip.identify.axis import exponent
-from stickslip.identify.axis.exponent import is_open, shown, with_other
+from stickslip.identify.axis.exponent import is_open, named_for_both, shown, with_other
+from stickslip.identify.axis.falling import fall_each_way
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.prediction import Rival, axis_prediction
 from stickslip.identify.axis.search import Asked
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
+from stickslip.identify.fit.axis_start import each_way
+from stickslip.identify.fit.parameter_vector import Parameter
 from stickslip.identify.observer.prediction_error import PredictionError
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.inverse import inverse_dynamics
@@ -75,6 +78,35 @@ def test_an_exponent_that_is_named_is_taken(logs: Any) -> None:
 def test_certain_sliding_says_nothing_without_a_fall() -> None:
     asked = Asked()
     assert shown(asked, None, [LAW]) == (asked, [])
+
+
+def test_an_exponent_is_that_of_both_directions(logs: Any) -> None:
+    """Of friction per direction one had kept the usual exponent, beside which the other's was found."""
+    record, truth = drawn(logs, 970060, 1.0)
+    law, sliding = each_way(LAW), regress_axis([record], AXIS, each_way=True)
+    assert shown(Asked(), sliding, [law])[0].values == {"delta_s": 1.0, "delta_s_negative": 1.0}
+    assert shown(Asked(), sliding, [LAW])[0].values == {"delta_s": 1.0}
+    named = Asked(values={"delta_s": 1.0})
+    assert named_for_both(named, [law]).values == {"delta_s": 1.0, "delta_s_negative": 1.0}
+    assert named_for_both(named, [LAW]).values == named.values
+    apart = Asked(values={"delta_s": 1.0, "delta_s_negative": 2.0})
+    assert named_for_both(apart, [law]).values == apart.values
+    assert not is_open(Asked(values={"delta_s_negative": 2.0}), [law])
+    # The fall that sliding shows for both stands where the prediction error does not tell a direction's.
+    par = next(f.par for f in law.fields if f.name == "vs")
+    for way, level in (("", "fc_positive"), ("_negative", "fc_negative")):
+        for name, true in (("fs", truth["fs"]), ("vs", truth["vs"])):
+            lost = Estimate(
+                f"{name}{way}", "", "", 9.0 * true, math.nan, 0.1 * true, 90.0 * true, False, "untold"
+            )
+            taken = fall_each_way(lost, sliding, Parameter(lost.name, par, true), 1.0, held=True)
+            assert taken.value == pytest.approx(true, rel=0.3)
+            assert not taken.identified
+        excess = sliding.numbers["fs"].value - sliding.numbers["fc"].value
+        rest = fall_each_way(
+            replace(lost, name=f"fs{way}"), sliding, Parameter(f"fs{way}", par, 1.0), 1.0, held=True
+        )
+        assert rest.value == pytest.approx(sliding.numbers[level].value + excess)
 
 
 def preferring(sliding: Regression, chances: Mapping[float, float]) -> Regression:

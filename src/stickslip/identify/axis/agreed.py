@@ -19,10 +19,10 @@ from stickslip.errors import InputError
 from stickslip.identify.axis.falling import (
     FALL,
     SAME,
+    fall_each_way,
     fall_together,
     told,
     with_rest,
-    with_timing,
     within_sliding,
 )
 from stickslip.identify.axis.form import told_with
@@ -164,8 +164,7 @@ def agreed(
         if e.name.removesuffix(NEGATIVE) not in FALL or e.name not in parameters:
             continue
         if found.each_way:
-            # Certain sliding has one fall for both directions.
-            taken[e.name] = with_timing(e, parameters[e.name], held=held)
+            taken[e.name] = fall_each_way(e, found, parameters[e.name], exponent_of(vector), held=held)
         else:
             taken[e.name], said = fall_together(e, found, parameters[e.name], exponent_of(vector), held=held)
             notes += said

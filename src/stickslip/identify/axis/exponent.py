@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
 from stickslip.identify.axis.falling import told
 from stickslip.identify.axis.prediction import axis_prediction, rival
@@ -38,7 +39,7 @@ MORE = 3.0
 Another friction each way, or a train that winds up, lets the wrong form explain a tenth more (998035, 998121)."""
 SURE = 0.99
 """Probability by certain sliding from which on the record is not asked."""
-TOLD = ("fs", "vs")
+TOLD = ("fs", "vs", f"fs{NEGATIVE}", f"vs{NEGATIVE}")
 """What depends on it most."""
 SHOWN = (
     "Friction falls as exp(-|v/vs|^delta_s) with delta_s = {found:g}, not the usual {usual:g}: {by} (--set "
@@ -52,8 +53,23 @@ UNDECIDED = (
 
 
 def is_open(asked: Asked, laws: Iterable[Law]) -> bool:
-    """Whether a law has an exponent that nobody named."""
-    return EXPONENT not in {*asked.values, *asked.free} and any(usual_of(law) is not None for law in laws)
+    """Whether a law has an exponent that nobody named, of either direction."""
+    named = {EXPONENT, EXPONENT + NEGATIVE} & {*asked.values, *asked.free}
+    return not named and any(usual_of(law) is not None for law in laws)
+
+
+def of_both_ways(exponent: float, laws: Iterable[Law]) -> dict[str, float]:
+    """An exponent of friction's fall by the names of some laws: one contact has one form, in either direction."""
+    names = {f.name for law in laws for f in law.fields}
+    return dict.fromkeys([n for n in (EXPONENT, EXPONENT + NEGATIVE) if n in names], exponent)
+
+
+def named_for_both(asked: Asked, laws: Iterable[Law]) -> Asked:
+    """What is asked, with an exponent that is named without its direction as that of both."""
+    other = EXPONENT + NEGATIVE
+    if EXPONENT not in asked.values or other in {*asked.values, *asked.free}:
+        return asked
+    return replace(asked, values={**of_both_ways(asked.values[EXPONENT], laws), **asked.values})
 
 
 def usual_of(law: Law) -> float | None:
@@ -68,7 +84,7 @@ def shown(asked: Asked, sliding: Regression | None, laws: Sequence[Law]) -> tupl
     if sliding is None or usual is None or not sliding.shows_a_fall or sliding.exponent == usual:
         return asked, []
     said = SHOWN.format(found=sliding.exponent, usual=usual, by=SLIDING)
-    return replace(asked, values={**asked.values, EXPONENT: sliding.exponent}), [said]
+    return replace(asked, values={**of_both_ways(sliding.exponent, laws), **asked.values}), [said]
 
 
 def predicted_with(
@@ -87,10 +103,13 @@ def predicted_with(
     # Of either form a tenth is left at the same speed.
     slower = Fall.like(1.0, FORMS[own]).vs / Fall.like(1.0, own).vs
     start = {
-        p.name: found.vector.named(found.u)[p.name] * slower for p in found.vector.free if p.name == "vs"
+        p.name: found.vector.named(found.u)[p.name] * slower
+        for p in found.vector.free
+        if p.name in ("vs", f"vs{NEGATIVE}")
     }
     try:
-        other = rival(experiments, axis, law, first, asked, found, {EXPONENT: FORMS[own]}, start)
+        fixed = of_both_ways(FORMS[own], [law])
+        other = rival(experiments, axis, law, first, asked, found, fixed, start)
     except InputError:
         return found, {}, []
     least = CLEARLY * found.cost
@@ -100,7 +119,7 @@ def predicted_with(
         return found, {}, []
     if other.better <= least or prefers(sliding, own):
         return found, {n: other.values[n] for n in TOLD if n in other.values}, [UNDECIDED]
-    values = {**asked.values, **other.values, EXPONENT: FORMS[own]}
+    values = {**asked.values, **other.values, **fixed}
     better = axis_prediction(
         experiments, axis, law, first=first, values=values, free=asked.free, frozen=asked.frozen, extras=asked.extras
     )  # fmt: skip

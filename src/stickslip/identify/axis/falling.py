@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from stickslip.binding import NEGATIVE
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parameter_vector import Parameter
@@ -15,7 +16,7 @@ from stickslip.identify.regression.regression import FALLS, Regression
 
 FALL = ("fs", "vs")
 """What friction's fall with velocity is told by."""
-BEGINS = ("vs", "vs_negative")
+BEGINS = ("vs", f"vs{NEGATIVE}")
 """The velocity of the fall, in each direction."""
 SAME = 0.05
 """Relative difference of two numbers that is none."""
@@ -133,9 +134,22 @@ def told(e: Estimate, p: Parameter, value: float, low: float, high: float, scale
 
 
 def with_timing(e: Estimate, p: Parameter, *, held: bool) -> Estimate:
-    """Fs or vs in one direction by the prediction error alone, as unsure as a moved torque and the law's form make
-    it."""
+    """Fs or vs by the prediction error alone, as unsure as a moved torque and the law's form make it."""
     return widened(e, p, 1.0 if held else MOVED) if e.identified else e
+
+
+def fall_each_way(
+    e: Estimate, found: Regression, p: Parameter, exponent: float | None, *, held: bool
+) -> Estimate:
+    """Fs or vs in one direction of the prediction error; where that does not tell it and certain sliding shows a fall,
+    which it has in common for both directions, that fall from the direction's own level."""
+    own = None if e.identified or not found.shows_a_fall else number_of(e.name[:2], found, exponent)
+    if own is None:
+        return with_timing(e, p, held=held)
+    if e.name not in BEGINS:
+        way = found.numbers["fc_negative" if e.name.endswith(NEGATIVE) else "fc_positive"]
+        own = replace(own, value=own.value - found.numbers["fc"].value + way.value)
+    return shown_by_sliding(e, own)
 
 
 def missing_fall(misfit: Mapping[str, float]) -> float:

@@ -28,7 +28,7 @@ from stickslip.identify.axis.choice import (
     shortlist,
 )
 from stickslip.identify.axis.drifting import at_the_middle, on_drift
-from stickslip.identify.axis.exponent import is_open, shown
+from stickslip.identify.axis.exponent import is_open, named_for_both, shown
 from stickslip.identify.axis.form import TOLD_BY_SLIDING
 from stickslip.identify.axis.in_sentences import on_bend, on_creep, on_swing, on_timing, on_width
 from stickslip.identify.axis.law_fit import Evidence, against_sliding, estimated
@@ -146,6 +146,7 @@ def identify_axis(
     if not plain_axis(asked) or (per_direction and "offset" not in frozen):
         evidence = replace(evidence, sliding=None)
     automatic, given = tuple(laws) == AUTOMATIC, asked
+    asked = named_for_both(asked, tried)
     if is_open(asked, tried):
         evidence = replace(evidence, exponent_open=True)
         asked, more = shown(asked, evidence.sliding, tried)
