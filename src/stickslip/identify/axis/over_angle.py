@@ -220,7 +220,7 @@ def orders_of(places: Places) -> Orders:
     highest = int(min(HIGHEST, RESOLVED / max(slow, 1e-12)))
     if highest < USUAL:
         raise InputError(
-            f"in {1.0 - SLOWER:.0%} of the rows of sliding, at "
+            f"in {100.0 * (1.0 - SLOWER):.0f} % of the rows of sliding, at "
             f"{float(np.quantile(np.abs(places.velocity), SLOWER)):.3g} rad/s and more, the rotor's inertia, not the "
             f"motor, carries the cogging: of orders above {highest} the slower rows alone tell anything, too few for a "
             "map, which is neither fitted nor applied; record slower motion"
