@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from stickslip.identify.fit.uncertainty import RATIO
 
@@ -30,8 +27,3 @@ class Number:
         """Whether its interval spans a factor of two at most."""
         low, high = self.interval
         return 0.0 < high <= RATIO * low
-
-
-def root_mean_square(x: np.ndarray[Any, np.dtype[np.float64]]) -> float:
-    """Of a series."""
-    return float(np.sqrt(np.mean(x * x)))

@@ -29,7 +29,7 @@ from stickslip.identify.regression.drifted import calm_beside_drift
 from stickslip.identify.regression.drifting import DRIFTS, drift_torque
 from stickslip.identify.regression.falls import Falling, fall_of
 from stickslip.identify.regression.flexible import train_torque, two_inertias
-from stickslip.identify.regression.number import QUANTILE, Number, root_mean_square
+from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.orders import without_waves
 from stickslip.identify.regression.rebuilding import rebuilt_within
 from stickslip.identify.regression.sliding_rows import (
