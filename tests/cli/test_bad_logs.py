@@ -157,10 +157,9 @@ def test_a_unit_that_nobody_knows_is_named(
     monkeypatch.chdir(tmp_path)
     head = HEAD.replace("[rad]", "[furlong]")
     np.savetxt("far.csv", np.column_stack((T, Q, TORQUE)), "%.9g", ",", header=head, comments="")
-    assert main(["doctor", "far.csv"]) == 0
-    assert (
-        "no unit that is known; taken were 'position [furlong]' as position in rad" in capsys.readouterr().out
-    )
+    assert main(["doctor", "far.csv"]) == 2
+    assert "'position [furlong]' is in 'furlong', which is none that is known" in capsys.readouterr().out
+    assert main(["doctor", "far.csv", "--map", "position=position [furlong]:rad"]) == 0
 
 
 def test_columns_that_are_not_used_are_listed(

@@ -42,8 +42,9 @@ def assumed(view: View) -> Iterator[Finding]:
     """Units that nobody states."""
     main = ("time", "position", "velocity", "motor_torque", "friction_torque", "current")
     quiet = [c for c in main if not view.stated(c)]
-    for channel in quiet:
+    for channel in list(quiet):
         if match := IN_BRACKETS.search(view.name(channel)):
+            quiet.remove(channel)
             which = AMBIGUOUS.get(match[1].lower(), "which is none that is known")
             message = f"{view.name(channel)!r} is in {match[1]!r}, {which}"
             remedy = f"say which it is, such as {view.mapped(channel, LIKELY[channel])}"
