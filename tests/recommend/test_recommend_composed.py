@@ -151,22 +151,14 @@ observer = {law = "disturbance_observer", corner = 40.0}
 """
 
 
+COMMAND = "recommend model.toml --controller loop.toml --amplitude 0.2 --axes 1".split()
+
+
 def test_the_command_writes_a_controller_that_runs_and_is_exported(tmp_path, monkeypatch, capsys, few):
     monkeypatch.chdir(tmp_path)
     Path("model.toml").write_text(MODEL)
     Path("loop.toml").write_text(LOOPS)
-    line = [
-        "recommend",
-        "model.toml",
-        "--controller",
-        "loop.toml",
-        "--amplitude",
-        "0.2",
-        "--axes",
-        "1",
-        "--confirm",
-        "0",
-    ]
+    line = [*COMMAND, "--confirm", "0"]
     assert main([*line, "--out", "out.toml", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     made = read_controller("out.toml")
@@ -242,17 +234,7 @@ def test_a_controllers_file_without_a_sample_time_is_sampled_as_any_loop(tmp_pat
     monkeypatch.chdir(tmp_path)
     Path("model.toml").write_text(MODEL)
     Path("loop.toml").write_text(LOOPS.replace("sample_time = 1e-3", "encoder_counts = 65536"))
-    line = [
-        "recommend",
-        "model.toml",
-        "--controller",
-        "loop.toml",
-        "--amplitude",
-        "0.2",
-        "--axes",
-        "1",
-        "--json",
-    ]
+    line = [*COMMAND, "--json"]
     for more, period, source in (
         ([], 1e-3, "assumed, as the model"),
         (["--sample-time", "5e-4"], 5e-4, "as given"),

@@ -131,7 +131,7 @@ def convert(
             listed.append(_entry(choice, "s"))
             continue
         unit = unit_of(choice, linear)
-        scale, target, steps = _scale(choice, unit, drive, linear)
+        scale, target, steps = _scale(choice, unit, drive)
         values, resampled = on_clock(columns[choice.column], time, origin, role)
         said += resampled
         channels[role] = scale * values + (unit.offset if unit.offset else 0.0)
@@ -140,7 +140,7 @@ def convert(
             _entry(choice, target) | {"factor": scale, "side": choice.side or "motor", "steps": steps}
         )
     said += _one_kind(channels, units, listed, drive)
-    said += [*_idle_gear(listed, drive), *_idle_rating(listed, drive)]
+    said += [*_idle_gear(listed, drive), *_idle_numbers(listed, drive)]
     derived, more = _torque_from_current(channels, units, drive, linear)
     reading = _reading(table, listed, drive, origin, [*said, *more])
     return Record(time, channels, units, {"reading": reading, "derived": derived})
@@ -199,7 +199,7 @@ def unit_of(choice: Choice, linear: bool) -> Unit:
     return Unit(LINEAR.get(kind, kind) if linear else kind)
 
 
-def _scale(choice: Choice, unit: Unit, drive: Drive, linear: bool) -> tuple[float, str, list[str]]:
+def _scale(choice: Choice, unit: Unit, drive: Drive) -> tuple[float, str, list[str]]:
     """Factor to SI on the record's side of the gear, the SI unit, and the steps in words."""
     kind, factor, steps = unit.kind, unit.factor, list[str]()
     if kind in ("counts", "count rate"):
@@ -286,7 +286,7 @@ def _steps_of(entry: Mapping[str, Any], word: str) -> bool:
     return any(word in step for step in entry.get("steps", ()))
 
 
-def _idle_rating(listed: Sequence[dict[str, Any]], drive: Drive) -> list[Finding]:
+def _idle_numbers(listed: Sequence[dict[str, Any]], drive: Drive) -> list[Finding]:
     """That a rated torque, a rated current or a lead converts nothing; of a share that states no unit the doctor
     speaks."""
     out: list[Finding] = []

@@ -143,7 +143,11 @@ def fall_each_way(
 ) -> Estimate:
     """Fs or vs in one direction of the prediction error; where that does not tell it and certain sliding shows a fall,
     which it has in common for both directions, that fall from the direction's own level."""
-    own = None if e.identified or not found.shows_a_fall else number_of(e.name[:2], found, exponent)
+    own = (
+        None
+        if e.identified or not found.shows_a_fall
+        else number_of(e.name.removesuffix(NEGATIVE), found, exponent)
+    )
     if own is None:
         return with_timing(e, p, held=held)
     if e.name not in BEGINS:

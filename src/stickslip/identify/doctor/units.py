@@ -14,7 +14,7 @@ from stickslip.identify.doctor.view import Array, View
 
 DEG, REV, RPM = math.pi / 180.0, 2.0 * math.pi, 2.0 * math.pi / 60.0
 POSITION = {"deg": DEG, "rev": REV, "mm": 1e-3, "um": 1e-6}
-IN_BRACKETS = re.compile(r"\[\s*([^\]]*[^\]\s\d][^\]]+?)\s*\]")
+STATED = re.compile(r"\[\s*([^\]]*[^\]\s\d][^\]]+?)\s*\]")
 """What a column's name states as its unit: not an axis' number or letter."""
 AMBIGUOUS: dict[str, str] = dict.fromkeys(
     ("1/s", "s-1", "1/sec"), "revolutions a second in some drives' tools and radians in others"
@@ -43,7 +43,7 @@ def assumed(view: View) -> Iterator[Finding]:
     main = ("time", "position", "velocity", "motor_torque", "friction_torque", "current")
     quiet = [c for c in main if not view.stated(c)]
     for channel in list(quiet):
-        if match := IN_BRACKETS.search(view.name(channel)):
+        if match := STATED.search(view.name(channel)):
             quiet.remove(channel)
             which = AMBIGUOUS.get(match[1].lower(), "which is none that is known")
             message = f"{view.name(channel)!r} is in {match[1]!r}, {which}"

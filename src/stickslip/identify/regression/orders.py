@@ -106,14 +106,10 @@ def shown_orders(
         Whether level and slope of friction may change evenly with time.
     """
     torque = np.concatenate([r.torque(skew) for r in records])
-    columns = np.column_stack([
+    basis = basis_of(np.column_stack([
         stacked(records, "fixed"), stacked(records, "jerk"), stacked(records, "falling")[:, list(falls)],
         *(around(records, order) for order in known), *([drift_columns(records)] if drifting else []),
-    ])  # fmt: skip
-    size = np.linalg.norm(columns, axis=0)
-    columns = columns[:, size > 0.0] / size[size > 0.0]
-    left, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    basis: Array = np.asarray(left[:, singular > 1e-6 * singular[0]], dtype=np.float64)
+    ]))  # fmt: skip
     residual: Array = np.asarray(torque - basis @ (basis.T @ torque), dtype=np.float64)
     pool: dict[float, Harmonic] = {}
     rows_of = functools.partial(around, records)
@@ -154,6 +150,13 @@ def shown_orders(
             for other, harmonic in pool.items():
                 pool[other] = harmonic.beside(rows_of(other), added, residual)
     return found
+
+
+def basis_of(columns: Array) -> Array:
+    """Orthonormal columns that span the same, shape (n, up to as many)."""
+    size = np.linalg.norm(columns, axis=0)
+    left, singular, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
+    return np.asarray(left[:, singular > 1e-6 * singular[0]], dtype=np.float64)
 
 
 def rivals_of(
