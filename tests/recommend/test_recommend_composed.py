@@ -151,7 +151,7 @@ observer = {law = "disturbance_observer", corner = 40.0}
 """
 
 
-COMMAND = "recommend model.toml --controller loop.toml --amplitude 0.2 --axes 1".split()
+COMMAND = ["recommend", "model.toml", "--controller", "loop.toml", "--amplitude", "0.2", "--axes", "1"]
 
 
 def test_the_command_writes_a_controller_that_runs_and_is_exported(tmp_path, monkeypatch, capsys, few):
