@@ -39,9 +39,9 @@ class Sliding:
     time, velocity, position : array, shape (n,)
         s, rad/s (m/s), rad (m).
     measured, model : array, shape (n,)
-        The torque that acted, less what friction's drift and a load's swing add to it, and that of the model, N·m (N).
+        The torque that acted, and that of the model with what friction's drift and a load's swing add to it, N·m (N).
     inertial : array, shape (n,)
-        What of the model's accelerates and lifts: all but friction and the constant torque, N·m (N).
+        What of the model's accelerates, lifts, drifts and swings: all but friction and the constant torque, N·m (N).
     record : array of int, shape (n,)
         Which record a row belongs to.
     certain : bool
@@ -116,15 +116,15 @@ def left_by_plain(regression: Regression, inverse: Any) -> float:
 
 
 def part(rows: SlidingRows, beside: Array, skew: float, mechanics: Mechanics) -> dict[str, Array]:
-    """What one record says, by the names of `Sliding`, without what no law and no rigid axis holds, N·m (N)."""
+    """What one record says, by the names of `Sliding`; `beside`: what no law and no rigid axis holds, N·m (N)."""
     step = max(1, math.ceil(rows.time.size / POINTS))
     some = slice(None, None, step)
-    inertial = mechanics.inertia * rows.fixed[some, ACCELERATION]
+    inertial = mechanics.inertia * rows.fixed[some, ACCELERATION] + beside[some]
     if mechanics.gravity:
         inertial = inertial + mechanics.gravity * np.sin(rows.position[some] - mechanics.gravity_angle)
     return {
         "time": rows.time[some], "velocity": rows.speed[some], "position": rows.position[some],
-        "measured": (rows.torque(skew) - beside)[some], "inertial": inertial,
+        "measured": rows.torque(skew)[some], "inertial": inertial,
     }  # fmt: skip
 
 
