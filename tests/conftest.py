@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -20,8 +21,10 @@ os.environ["STICKSLIP_CONFIG"] = tempfile.mkdtemp(prefix="stickslip-tests-")
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+_MADE = [os.environ["STICKSLIP_CONFIG"]]
+
 # What C compilers made is kept where compiled kernels are; set before anything is tried, so that workers inherit it.
-kept_compilers.put_first()
+_MADE += kept_compilers.put_first()
 
 # The first example of a test may compile for seconds: no example is held to a time.
 settings.register_profile("stickslip", deadline=None)
@@ -46,6 +49,12 @@ LONGEST = (
     "study/test_stability_map", "web/test_sent", "identify/test_exponent", "identify/test_prediction_error",
     "test_compiled_code", "simulation/test_lanes", "rigs/test_faults",
 )  # fmt: skip
+
+
+def pytest_unconfigure() -> None:
+    """What this process made beside pytest's own folders goes with it."""
+    for folder in _MADE:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

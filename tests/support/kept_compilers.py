@@ -53,10 +53,10 @@ exit $code
 """
 
 
-def put_first() -> None:
-    """Put the compilers that this machine has before all others in PATH; once, for all workers."""
+def put_first() -> list[str]:
+    """Put the compilers that this machine has before all others in PATH, once for all workers; the folders made."""
     if MARK in os.environ or os.name != "posix":
-        return
+        return []
     cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     home = Path(os.environ.get("STICKSLIP_CACHE") or os.path.join(cache, "stickslip")).absolute() / "c"
     folder = Path(tempfile.mkdtemp(prefix="stickslip-compilers-"))
@@ -74,6 +74,7 @@ def put_first() -> None:
         script.chmod(0o755)
     os.environ[MARK] = str(folder)
     os.environ["PATH"] = f"{folder}{os.pathsep}{os.environ['PATH']}"
+    return [str(folder)]
 
 
 def forget(kept: Path) -> None:

@@ -23,11 +23,12 @@ def main() -> int:
     channel = os.fdopen(os.dup(1), "w", encoding="utf-8", errors="replace")
     os.dup2(2, 1)
     warnings.simplefilter("ignore")
-    with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
-        for line in sys.stdin:
+    for line in sys.stdin:
+        # A folder for each: this process is ended from outside, and would leave one that it keeps.
+        with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
             answer = answered(json.loads(line), Path(folder) / "case.toml")
-            channel.write(json.dumps(plain(answer), ensure_ascii=False, allow_nan=False) + "\n")
-            channel.flush()
+        channel.write(json.dumps(plain(answer), ensure_ascii=False, allow_nan=False) + "\n")
+        channel.flush()
     return 0
 
 
