@@ -169,6 +169,23 @@ def test_a_weight_is_no_friction_that_differs_by_direction(logs: Any) -> None:
         identify_axis([record], ServoAxis(drive_side="load"), ["coulomb"], per_direction=True)
 
 
+def test_levels_that_a_weight_makes_differ_are_not_identified(logs: Any) -> None:
+    """Another program's: six levels, 123 % wrong the worst, were identified beside weights below friction."""
+    log = logs.draw(2000160, "actual", 1000, "feedforward", "staircase", "clean")
+    fc = log.truth["fc"]
+    record = Experiment("log", log.time, log.position, log.torque + 0.5 * fc - log.truth["offset"])
+    axis = ServoAxis(drive_side="load")
+    found = {e.name: e for e in identify_axis([record], axis, ["coulomb"], per_direction=True).estimates}
+    assert found["inertia"].identified
+    for name in ("fc", "fc_negative"):
+        assert not found[name].identified
+        assert "both ways and a constant torque of" in found[name].verdict
+    with pytest.raises(InputError, match=r"offset = 0\.1 N·m.*subtract it.*leave out --per-direction"):
+        identify_axis(
+            [record], axis, ["coulomb"], per_direction=True, frozen=("offset",), values={"offset": 0.1}
+        )
+
+
 def test_both_directions_know_of_each_other(logs: Any) -> None:
     """Levels are drawn with the correlation that they have: their mean is surer than either."""
     log = logs.draw(2000160, "actual", 1000, "feedforward", "staircase", "asymmetry")

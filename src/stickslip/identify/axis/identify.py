@@ -134,6 +134,7 @@ def identify_axis(
     tried = [plugins.law(x) if isinstance(x, str) else x for x in laws]
     if per_direction:
         tried = [each_way(law) for law in tried]
+        refuse_a_known_torque(frozen, values or {}, axis)
         if "offset" not in (*free, *(values or {})):
             frozen, values = (*frozen, "offset"), {"offset": 0.0, **(values or {})}
     asked = Asked(free, frozen, values or {}, extras, robust)
@@ -205,6 +206,21 @@ def refuse_a_weight(sliding: Regression | None, axis: ServoAxis) -> None:
                 f"than friction, {level:.3g}: it cannot be distinguished from a difference between "
                 "friction's directions; leave out --per-direction"
             )
+
+
+def refuse_a_known_torque(frozen: Sequence[str], values: Mapping[str, float], axis: ServoAxis) -> None:
+    """Refuse a constant torque that is held beside friction per direction: certain sliding counts it as friction.
+
+    Raises
+    ------
+    InputError
+    """
+    known = values.get("offset", 0.0)
+    if "offset" in frozen and known != 0.0:
+        raise InputError(
+            f"offset = {known:g} {axis.unit('N·m')}: a constant torque that is known is not taken off friction per "
+            "direction; subtract it from the torque's column, or leave out --per-direction"
+        )
 
 
 def rather_simplest(

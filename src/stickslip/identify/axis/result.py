@@ -62,6 +62,15 @@ EXPLAINS_NOTHING = (
     "describe this axis"
 )
 STRIBECK = ("fs", "vs", "delta_s")
+EACH_LEVEL = ("fc", "fc_negative")
+UNEVEN = 0.3
+"""Part of friction's level by which either direction may differ from it before a constant torque is likelier: on
+another program's axes 24 levels without one were within it and held, 6 that counted one as friction were beyond."""
+PERHAPS_A_WEIGHT = (
+    "friction of {forward:.4g} and {backward:.4g} {unit} may as well be {middle:.4g} {unit} both ways and a constant "
+    "torque of {constant:.4g} {unit} (a weight, a spring, an offset), which one record does not distinguish; leave out "
+    "--per-direction"
+)
 LOOP_OFF = 0.3
 """Relative error of the simulated loop's drive signal from which on its gains are doubted."""
 
@@ -79,6 +88,7 @@ def assembled(
         judged = constant_torque_told(judged)
         if any(e.name == "fs_negative" for e in judged):
             judged = with_rest(judged)  # no certain sliding says more of either direction
+    judged = apart_from_a_weight(judged)
     misfit = errors_of(experiments, result.problem.signals, result.misfits(experiments))
     axis, named = result.problem.axis, result.problem.vector.named(result.u)
     if inverse is not None and inverse.has("fc"):
@@ -209,6 +219,24 @@ def constant_torque_told(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
         return tuple(estimates)
     return tuple(
         replace(e, identified=False, verdict=e.verdict or HELD_BY_FRICTION) if e.name == "offset" else e
+        for e in estimates
+    )
+
+
+def apart_from_a_weight(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """The estimates, friction's levels refused where they differ by so much that a constant torque is likelier."""
+    level = {e.name: e for e in estimates if e.name in EACH_LEVEL}
+    if len(level) < len(EACH_LEVEL) or any(e.name == "offset" for e in estimates):
+        return tuple(estimates)
+    forward, backward = (level[n].value for n in EACH_LEVEL)
+    middle, constant = 0.5 * (forward + backward), 0.5 * (forward - backward)
+    if abs(constant) <= UNEVEN * middle:
+        return tuple(estimates)
+    why = PERHAPS_A_WEIGHT.format(
+        forward=forward, backward=backward, middle=middle, constant=constant, unit=level["fc"].unit
+    )
+    return tuple(
+        replace(e, identified=False, verdict=why) if e.name in EACH_LEVEL and e.identified else e
         for e in estimates
     )
 
