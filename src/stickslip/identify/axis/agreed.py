@@ -311,7 +311,7 @@ def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tup
     nor when the torque acted was seen.
 
     Nothing at all is where inertia, level or slope contradicts the plain inverse dynamics: nothing decides between
-    the two.
+    the two, and the intervals hold what either says.
     """
     out = tuple(estimates)
     for e in out:
@@ -321,13 +321,24 @@ def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tup
         apart = abs(other[0] - e.value) > math.hypot(0.5 * (e.upper - e.lower), other[1])
         if apart and abs(other[0] - e.value) > SAME * abs(e.value):
             why = UNDECIDED.format(name=e.name, own=f"{e.value:.4g}", other=f"{other[0]:.4g} {e.unit}")
-            return tuple(replace(x, identified=False, verdict=why) if x.identified else x for x in out)
+            refused = (replace(x, identified=False, verdict=why) if x.identified else x for x in out)
+            return tuple(holding_either(x, plain_value(x.name, inverse)) for x in refused)
     return tuple(
         replace(e, identified=False, verdict=UNSEEN)
         if e.identified and e.name.removesuffix(NEGATIVE) in LEVELS
         else e
         for e in out
     )
+
+
+def holding_either(e: Estimate, other: tuple[float, float] | None) -> Estimate:
+    """The estimate with an interval that holds what the plain inverse dynamics says, a value and its half-width, too;
+    none but a constant torque is below 0."""
+    if other is None:
+        return e
+    value, half = other
+    low, high = min(e.lower, value - half), max(e.upper, value + half)
+    return replace(e, lower=low if e.name == "offset" else max(low, 0.0), upper=high)
 
 
 def as_good(inverse: InverseDynamics, found: Regression, times: float = AS_GOOD) -> bool:
