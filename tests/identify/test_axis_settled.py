@@ -303,7 +303,12 @@ def test_without_certain_sliding_no_level_is_identified_and_nothing_that_plain_l
     found = held_against(wrong, inverse)
     assert not any(e.identified for e in found)
     assert all("too little in one direction to decide" in e.verdict for e in found)
-    plain = {"inertia": inverse["inertia"], "fc": inverse.coulomb, "sigma2": inverse.viscous, "offset": inverse.offset}
+    plain = {
+        "inertia": inverse["inertia"],
+        "fc": inverse.coulomb,
+        "sigma2": inverse.viscous,
+        "offset": inverse.offset,
+    }
     for e in found:
         assert e.name not in plain or e.lower <= plain[e.name] <= e.upper
         assert e.lower <= e.value <= e.upper

@@ -15,7 +15,8 @@ from stickslip.identify.axis.result import advice, explaining
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter
-from stickslip.identify.regression.regression import APART, DRIVES, regress_axis
+from stickslip.identify.regression.reasons import APART, DRIVES
+from stickslip.identify.regression.regression import regress_axis
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Par
 

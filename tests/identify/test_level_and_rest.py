@@ -20,10 +20,9 @@ from stickslip.identify.fit.smooth import Window
 from stickslip.identify.regression.bands import WEIGHT
 from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.identify.regression.number import Number
+from stickslip.identify.regression.reasons import AT_ONE_SPEED, LEVEL_UNTOLD
 from stickslip.identify.regression.rebuilding import rebuilt_within
 from stickslip.identify.regression.regression import (
-    AT_ONE_SPEED,
-    LEVEL_UNTOLD,
     Regression,
     regress_axis,
     with_form,
@@ -231,3 +230,20 @@ def test_within_which_way_friction_is_built_up_again(logs: Any) -> None:
     assert rebuilt_within(rows, 0.0, WEIGHT) < 0.1 * rebuilt_within(rows, 0.0)
     fast, truth = regressed(logs, 70013, "commanded", 1000, "feedforward", "sine", "clean")
     assert 1e-3 < truth["fc"] / truth["sigma0"] * 10.0 < fast.rebuilt
+
+
+@pytest.mark.parametrize("noise", [0.3, 3.0])
+def test_an_inertia_beside_which_friction_drowns_is_told_all_the_same(noise: float) -> None:
+    """It was refused with friction, known to 0.5 % and 3 % (another program's: three inertias within 0.3 %)."""
+    t = np.arange(8000) * 1e-3
+    w = 2.0 * np.pi * np.array([0.5, 0.8])
+    v = 6.0 * np.sin(w[0] * t) + 3.0 * np.sin(w[1] * t)
+    a = 6.0 * w[0] * np.cos(w[0] * t) + 3.0 * w[1] * np.cos(w[1] * t)
+    torque = 0.5 * a + 0.05 * np.sign(v) + np.random.default_rng(1).normal(0.0, noise, t.size)
+    position = np.round(np.cumsum(v) * 1e-3, 6)
+    found = identify_axis([Experiment("log", t, position, torque)], AXIS, ["coulomb"])
+    by_name = {e.name: e for e in found.estimates}
+    assert by_name["inertia"].identified
+    assert by_name["inertia"].lower < 0.5 < by_name["inertia"].upper
+    assert not any(by_name[n].identified for n in ("fc", "sigma2", "offset"))
+    assert any(n.startswith("The inertia alone is identified: friction is too small") for n in found.notes)

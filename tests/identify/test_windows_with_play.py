@@ -11,12 +11,8 @@ from stickslip.identify.axis.in_sentences import on_creep
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.creeping import NOWHERE
 from stickslip.identify.regression.number import Number
-from stickslip.identify.regression.regression import (
-    STILL_ROUGH,
-    UNSURE_THERE,
-    Regression,
-    regress_axis,
-)
+from stickslip.identify.regression.reasons import STILL_ROUGH, UNSURE_THERE
+from stickslip.identify.regression.regression import Regression, regress_axis
 from stickslip.machines.servo import ServoAxis
 
 AXIS = ServoAxis(drive_side="load")

@@ -33,7 +33,8 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.regression.narrow import LATE_FALL, SMOOTHED, falls_late, smoothed_by
+from stickslip.identify.regression.narrow import LATE_FALL, SMOOTHED, falls_late, inertia_alone, smoothed_by
+from stickslip.identify.regression.reasons import DROWNED
 from stickslip.identify.regression.regression import QUANTILE, Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
 from stickslip.identify.regression.strokes import stacked
@@ -177,8 +178,13 @@ def agreed(
             for e in out
         )
     if found.doubt:
-        out = tuple(replace(e, identified=False, verdict=found.doubt) if e.identified else e for e in out)
-        notes.append(f"Nothing is identified: {found.doubt}.")
+        kept, why, what = "", found.doubt, "Nothing"
+        if inertia_alone(found):
+            kept, why, what = "inertia", DROWNED.format(share=found.unsure_share), "The inertia alone"
+        out = tuple(
+            replace(e, identified=False, verdict=why) if e.identified and e.name != kept else e for e in out
+        )
+        notes.append(f"{what} is identified: {why}.")
     return out, notes
 
 

@@ -30,7 +30,8 @@ from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.identify.regression.bands import GAUSSIAN
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.regression.regression import NOT_AS_ONE, Regression
+from stickslip.identify.regression.reasons import NOT_AS_ONE
+from stickslip.identify.regression.regression import Regression
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model

@@ -31,6 +31,16 @@ from stickslip.identify.regression.falls import Falling, fall_of
 from stickslip.identify.regression.flexible import train_torque, two_inertias
 from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.orders import without_waves
+from stickslip.identify.regression.reasons import (
+    APART,
+    AT_ONE_SPEED,
+    BEYOND_LEVEL,
+    DRIVES,
+    LEVEL_UNTOLD,
+    STILL_ROUGH,
+    UNMOVED,
+    UNSURE_THERE,
+)  # fmt: skip
 from stickslip.identify.regression.rebuilding import rebuilt_within
 from stickslip.identify.regression.sliding_rows import (
     Fall,
@@ -62,39 +72,13 @@ STRAIGHT = 0.15
 another program's 200 logs, 5 to 15 % unsure, all held, wrong by 4 % at most."""
 FALLS, SHOWN = 0.95, 4.0
 """Probability, and standard deviations of Fs - Fc, from which on friction is taken to fall with velocity."""
-LEVEL_UNTOLD = (
-    "extrapolated: friction may still fall at the highest recorded speeds, and viscous friction is not distinguished "
-    "from it"
-)
 ONE_SPEED = 0.65
 """Of the highest speed, from which on the slowest rows lie at the same: level and slope are then one number. Levels of
 parts of a motor's record from 0.6 of it on agree; one of another program's log, from 0.69 on, was 35 % too low."""
-AT_ONE_SPEED = (
-    "extrapolated: the slowest gross sliding is at {share:.0%} of the highest speed, where level and slope of "
-    "friction are one number; record slower moves, too"
-)
-STILL_ROUGH = "motor and load do not move as one even in the windows in which they do so best, and "
-UNSURE_THERE, ROUGHLY = "it is unsure to {share:.0%} there; identified means at most {most:.0%}", 0.1
-NOT_AS_ONE = "the axis does not follow its torque as one inertia does"
-APART = (
-    f"{NOT_AS_ONE}, or slides too briefly: what its acceleration needs is unsure to {{share:.2g}} of Fc; record longer "
-    "and gentler motion"
-)
+ROUGHLY = 0.1
+"""Part of Fc to which it must then be told in windows in which motor and load do not move as one."""
 BEYOND = 2.0
 """Times Fc that may be left of the torque in certain sliding for anything to be believed."""
-BEYOND_LEVEL = (
-    f"{NOT_AS_ONE}: more than twice the level of friction is left "
-    "unexplained where it slides; record gentler motion"
-)
-DRIVES = (
-    "the level of friction comes out below 0, so that it would drive the axis: the columns do not belong together, "
-    "or something else moves it (cogging at one speed); record moves at several speeds, all columns by one clock"
-)
-UNMOVED = (
-    "the torque shows neither the pendulum's inertia nor its weight, which move it all the same: it is what a "
-    "controller makes of the velocity (bang-bang, energy shaping), not what friction needs; record moves under "
-    "position control"
-)
 SWUNG = 0.5
 """rad that a pendulum must swing for its weight to be looked for in the torque."""
 
@@ -246,13 +230,17 @@ class Regression:
         return level if self.numbers["fc"].told_to_two else level + slope * usual
 
     @property
+    def unsure_share(self) -> float:
+        """Part of Fc to which the torque that the usual acceleration needs is unsure."""
+        usual = float(np.sqrt(np.mean(stacked(self.rows, "fixed")[:, 0] ** 2)))
+        return QUANTILE * self.numbers["inertia"].std * usual / max(abs(self.numbers["fc"].value), 1e-300)
+
+    @property
     def doubt(self) -> str:
         """Why its numbers are not to be believed; empty where they are."""
-        inertia, level = self.numbers["inertia"], abs(self.numbers["fc"].value)
-        usual = float(np.sqrt(np.mean(stacked(self.rows, "fixed")[:, 0] ** 2)))
-        unsure = QUANTILE * inertia.std * usual
-        if unsure > UNSURE * level:
-            return APART.format(share=unsure / max(level, 1e-300))
+        level = abs(self.numbers["fc"].value)
+        if self.unsure_share > UNSURE:
+            return APART.format(share=self.unsure_share)
         if self.unexplained_by(self.own) > BEYOND * level:
             return BEYOND_LEVEL
         if self.interval("fc")[1] < 0.0:
