@@ -79,10 +79,11 @@ UNDECIDED = (
 
 def regressed(
     experiments: Sequence[Experiment], axis: ServoAxis, skew: float | None, harmonic_period: float | None = None,
-    regress: Regress = regress_axis, each_way: bool = False,
+    regress: Regress = regress_axis, each_way: bool = False, known: Mapping[str, float] | None = None,
 ) -> tuple[Regression | None, list[str]]:  # fmt: skip
     """The regression on certain sliding, where the records allow it; else why they do not."""
-    ways = {"each_way": True} if each_way else {}  # what the doctor has asked is asked again
+    # What the doctor has asked is asked again.
+    ways = ({"each_way": True} if each_way else {}) | ({"known": known} if known else {})
     if any(t.drive is None for t in experiments):
         return None, []
     try:

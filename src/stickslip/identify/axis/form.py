@@ -22,6 +22,8 @@ TOLD_BY_SLIDING = (
 OTHERWISE = {"fc": 1.3, "fs": 1.6, "vs": 3.0, "sigma2": 2.0}
 """Factors of a second set of values at which the curves must be the same, so that it is their form that is."""
 SPEEDS = 40
+USUAL_SPEEDS = 1e-3, 1e2
+"""rad/s (m/s)."""
 ALIKE = 1e-3
 """Part of friction's level that the curves may be apart."""
 EXCEEDS = 1.05
@@ -79,6 +81,11 @@ def usual_curve(p: Any, v: Array) -> Array:
 def told_with(model: Model | None, found: Regression) -> bool:
     """Whether what a regression tells of friction are parameters of this law."""
     return model is None or of_sliding_form(model, found.slowest, found.fastest)
+
+
+def by_usual_names(law: Law) -> bool:
+    """Whether a law's ``fc`` and ``sigma2`` are level and slope of friction, by its example."""
+    return of_sliding_form(Model(law, **law.example), *USUAL_SPEEDS)
 
 
 def static_by_name(model: Model) -> bool:

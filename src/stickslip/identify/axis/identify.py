@@ -31,6 +31,7 @@ from stickslip.identify.axis.drifting import at_the_middle, on_drift
 from stickslip.identify.axis.exponent import is_open, named_for_both, shown
 from stickslip.identify.axis.form import TOLD_BY_SLIDING
 from stickslip.identify.axis.in_sentences import on_bend, on_creep, on_swing, on_timing, on_width
+from stickslip.identify.axis.known import known_to_sliding, refuse_a_known_torque, refuse_a_weight
 from stickslip.identify.axis.law_fit import Evidence, against_sliding, estimated
 from stickslip.identify.axis.output import judged
 from stickslip.identify.axis.result import assembled, narrow_note, noted
@@ -40,7 +41,7 @@ from stickslip.identify.estimate import Estimate, Identification, silent
 from stickslip.identify.experiment import Experiment, insist_on_motion
 from stickslip.identify.fit.axis_start import each_way
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
-from stickslip.identify.regression.regression import Regression, regress_axis
+from stickslip.identify.regression.regression import regress_axis
 from stickslip.identify.regression.regressions import Regress
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
@@ -139,7 +140,8 @@ def identify_axis(
             frozen, values = (*frozen, "offset"), {"offset": 0.0, **(values or {})}
     asked = Asked(free, frozen, values or {}, extras, robust)
     refuse_harmonics(experiments, extras.harmonics + extras.friction_harmonics, simulated=True)
-    evidence, notes = looked_at(experiments, validation, axis, extras, skew, per_direction, regress)
+    known = known_to_sliding(asked, tried, per_direction)
+    evidence, notes = looked_at(experiments, validation, axis, extras, skew, per_direction, regress, known)
     if per_direction:
         refuse_a_weight(evidence.sliding, axis)
     if evidence.inverse is None:
@@ -189,40 +191,6 @@ def refuse_slow(experiments: Sequence[Experiment]) -> None:
             )
 
 
-def refuse_a_weight(sliding: Regression | None, axis: ServoAxis) -> None:
-    """Refuse friction per direction where it would drive the axis in one of them: a constant torque acts.
-
-    Raises
-    ------
-    InputError
-    """
-    if sliding is None or not sliding.each_way:
-        return
-    level, constant = abs(sliding.numbers["fc"].value), sliding.numbers["offset"].value
-    for name in ("fc_positive", "fc_negative"):
-        if sliding.interval(name)[1] < 0.0:
-            raise InputError(
-                f"a constant torque of {constant:.3g} {axis.unit('N·m')} acts, a weight, a spring or an offset, larger "
-                f"than friction, {level:.3g}: it cannot be distinguished from a difference between "
-                "friction's directions; leave out --per-direction"
-            )
-
-
-def refuse_a_known_torque(frozen: Sequence[str], values: Mapping[str, float], axis: ServoAxis) -> None:
-    """Refuse a constant torque that is held beside friction per direction: certain sliding counts it as friction.
-
-    Raises
-    ------
-    InputError
-    """
-    known = values.get("offset", 0.0)
-    if "offset" in frozen and known != 0.0:
-        raise InputError(
-            f"offset = {known:g} {axis.unit('N·m')}: a constant torque that is known is not taken off friction per "
-            "direction; subtract it from the torque's column, or leave out --per-direction"
-        )
-
-
 def rather_simplest(
     found: Identification, asked: Asked, named: Set[str], evidence: Evidence, notes: Sequence[str]
 ) -> Identification:
@@ -264,12 +232,12 @@ def by_output_error(
 
 def looked_at(
     experiments: Sequence[Experiment], validation: Sequence[Experiment], axis: ServoAxis, extras: Extras,
-    skew: float | None, per_direction: bool, regress: Regress,
+    skew: float | None, per_direction: bool, regress: Regress, known: Mapping[str, float],
 ) -> tuple[Evidence, list[str]]:  # fmt: skip
     """What the regressions tell, the torque of every record moved to where it acted; and what is to be said."""
     # A turn is what the regression takes where no period is given: so the doctor has asked before.
     period = None if extras.harmonic_period == Extras().harmonic_period else extras.harmonic_period
-    sliding, notes = regressed(experiments, axis, skew, period, regress, per_direction)
+    sliding, notes = regressed(experiments, axis, skew, period, regress, per_direction, known)
     experiments = at_the_middle(aligned(experiments, sliding), axis, sliding)
     validation = aligned(validation, sliding)
     inverse, more = first_look(experiments, axis, extras, per_direction)

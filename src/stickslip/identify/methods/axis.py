@@ -56,6 +56,7 @@ def identified(
     fitted, held = experiments[:count], experiments[count:]
     refuse_for_every_law(axis, fitted, options)
     if options.inverse:
+        refuse_held(options)
         plain = inverse_dynamics(
             fitted, axis, per_direction=options.per_direction, harmonics=options.harmonics
         )
@@ -99,3 +100,17 @@ def skew_of(experiments: Sequence[Experiment], options: Options) -> float | None
 
 
 METHOD = Method("axis", "inertia, offset or gravity and friction jointly", identify, driven, holds_out=True)
+
+
+def refuse_held(options: Options) -> None:
+    """Refuse values that are known where every number is fitted.
+
+    Raises
+    ------
+    InputError
+    """
+    if options.frozen:
+        raise InputError(
+            f"the plain inverse dynamics (--inverse) fits every number: {', '.join(options.frozen)} cannot be held "
+            "there; leave out --inverse, or the value that is known"
+        )

@@ -107,7 +107,7 @@ def fit_band(
     records: Sequence[SlidingRows], tried: Sequence[Fall], *, orders: Sequence[float] = (),
     background: Sequence[float] = (), pendulum: bool = False, skew_size: float = 3e-3, skew: float | None = None,
     start: float = 0.0, blurred: bool = False, each_way: bool = False, drifting: bool = False,
-    train: Train = Train.RIGID,
+    train: Train = Train.RIGID, known: Mapping[str, float] | None = None,
 ) -> BandFit:  # fmt: skip
     """Fit the rows of certain sliding that one window shows.
 
@@ -135,8 +135,10 @@ def fit_band(
         Whether level and slope of friction may change evenly with time.
     train : Train
         What moves.
+    known : mapping of str to float, optional
+        Values that are not fitted, of `stickslip.identify.regression.band_system.COLUMNS`.
     """
-    system = System(records, tried, orders, background, pendulum, skew_size, each_way, drifting, train)
+    system = System(records, tried, orders, background, pendulum, skew_size, each_way, drifting, train, known)
     waves = (len(orders), len(background)) if blurred and orders else None
     system.expected = start if skew is None else skew
     at, torque, candidates, weight = settled(system, skew is not None, waves)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -28,6 +28,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Places = np.ndarray[Any, np.dtype[np.int64]]
 
 INERTIA, VISCOUS, COULOMB, OFFSET, JERK = range(5)
+COLUMNS = {"inertia": INERTIA, "sigma2": VISCOUS, "fc": COULOMB, "offset": OFFSET}
 NONE_PRIOR = 0.5  # probability, before the record, that friction does not fall with velocity
 USUAL, OFTEN = (
     0.2,
@@ -54,6 +55,7 @@ FEW = 4  # degrees of freedom, below which a variance refutes nothing
 SYSTEMATIC = 0.02  # of the misfit: what may not average out
 STIFF, LATE = 0.12, 0.2  # the same for inertia and skew, of an axis that is not stiff
 DAMPED_AWAY = 1e-100  # norm of a column
+FIRM = 1e8  # times what a record says of a column: weight of a coefficient that is known
 LEAST = 1e-14  # of the largest eigenvalue of products: below it there is rounding alone
 
 
@@ -174,9 +176,10 @@ class System:
     def __init__(
         self, records: Sequence[SlidingRows], falls: Sequence[Fall], orders: Sequence[float], background:
         Sequence[float], pendulum: bool, skew_size: float, each_way: bool = False, drifting: bool = False,
-        train: Train = Train.RIGID,
+        train: Train = Train.RIGID, known: Mapping[str, float] | None = None,
     ):  # fmt: skip
         self.records, self.skew_size, self.expected = records, skew_size, 0.0
+        self.known = {COLUMNS[name]: value for name, value in (known or {}).items()}
         self.train = train
         self.stroke = strokes_of(records)
         self.shortest = rows_in(PIECE, records)
@@ -277,6 +280,9 @@ class System:
             right[:, JERK] += moved
             size = own.shape[1]
             matrix += 1e-11 / size * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(size)
+            for place, value in self.known.items():
+                right[:, place] += FIRM * value * self.scale[place]
+                matrix[:, place, place] += FIRM
             inverse = inverses_of(matrix)
             values = (inverse @ right[:, :, None])[:, :, 0]
             coefficients = alone - (mixing @ values[:, :, None])[:, :, 0]

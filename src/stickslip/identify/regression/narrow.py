@@ -1,4 +1,4 @@
-"""Numbers of certain sliding that are not identified although their intervals are narrow, and the inertia beside them."""
+"""Numbers of certain sliding not identified although their intervals are narrow, and an inertia that is beside them."""
 
 from __future__ import annotations
 

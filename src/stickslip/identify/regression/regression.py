@@ -329,7 +329,7 @@ class Regression:
 
 def regress_axis(
     experiments: Sequence[Experiment], axis: ServoAxis, *, skew: float | None = None, harmonics: bool = True,
-    harmonic_period: float | None = None, each_way: bool = False,
+    harmonic_period: float | None = None, each_way: bool = False, known: Mapping[str, float] | None = None,
 ) -> Regression:  # fmt: skip
     """Inertia, friction, offset and skew of an axis by least squares on certain sliding, in several bands.
 
@@ -346,6 +346,8 @@ def regress_axis(
         rad (m) after which it repeats; a turn unless given.
     each_way : bool
         Whether friction has a level and a slope of its own in each direction.
+    known : mapping of str to float, optional
+        ``inertia``, ``sigma2``, ``fc``, ``offset`` as far as they are known: the others are fitted beside them.
 
     Returns
     -------
@@ -363,6 +365,7 @@ def regress_axis(
     size = max(SKEW_ROWS * period, SKEW_TIME) if skew is None else GIVEN * period
     options: dict[str, Any] = {
         "pendulum": axis.gravity == "pendulum", "skew_size": size, "skew": skew, "each_way": each_way,
+        "known": known,
     }  # fmt: skip
     ask = (axis, options, harmonics, harmonic_period)
     seen = calm_beside_drift(signals, width, *ask)
@@ -378,6 +381,7 @@ def regress_axis(
         numbers[name] = holding(numbers[name], together(name, seen.perhaps))
     for way in ("", "_positive", "_negative") if each_way else ("",):
         numbers[f"fc{way}"] = with_form(numbers[f"fc{way}"], numbers[f"sigma2{way}"])
+    numbers |= {name: Number(value, 0.0) for name, value in (known or {}).items()}
     numbers["skew"] = Number(skew, size) if skew is not None else as_told(numbers, size, period, seen.train)
     weight = WEIGHT if axis.gravity == "pendulum" else ()
     whole = [sliding_rows(s, Window(width, s.period)) for s in signals]

@@ -1,0 +1,88 @@
+"""What is known of an axis is not fitted, and everything else is fitted beside it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stickslip as ss
+from stickslip.errors import InputError
+from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.experiment import Experiment
+from stickslip.identify.regression.regression import regress_axis
+from stickslip.machines.servo import ServoAxis
+
+AXIS = ServoAxis(drive_side="load")
+TRUE = {"inertia": 4e-3, "fc": 0.3, "sigma2": 0.02, "offset": 0.01}
+
+
+@pytest.fixture(scope="module")
+def record() -> Experiment:
+    """Two sines, the torque about its row, with noise."""
+    t = np.arange(8000) * 1e-3
+    w = 2.0 * np.pi * np.array([0.5, 0.8])
+    v = 6.0 * np.sin(w[0] * t) + 3.0 * np.sin(w[1] * t)
+    a = 6.0 * w[0] * np.cos(w[0] * t) + 3.0 * w[1] * np.cos(w[1] * t)
+    torque = TRUE["inertia"] * a + TRUE["fc"] * np.sign(v) + TRUE["sigma2"] * v + TRUE["offset"]
+    noise = np.random.default_rng(2).normal(0.0, 0.02, t.size)
+    return Experiment("log", t, np.round(np.cumsum(v) * 1e-3, 6), torque + noise)
+
+
+def identified(record: Experiment, **known: float) -> tuple[Identification, dict[str, Estimate]]:
+    found = identify_axis([record], AXIS, ["coulomb"], frozen=tuple(known), values=known)
+    return found, {e.name: e for e in found.estimates}
+
+
+@pytest.mark.parametrize("name", sorted(TRUE))
+def test_beside_a_true_value_the_others_hold_and_are_no_less_sure(record: Experiment, name: str) -> None:
+    _, free = identified(record)
+    found, others = identified(record, **{name: TRUE[name]})
+    assert others.keys() == free.keys() - {name}
+    for n, e in others.items():
+        assert e.identified
+        assert e.lower <= TRUE[n] <= e.upper
+        assert e.upper - e.lower <= 1.1 * (free[n].upper - free[n].lower)
+    assert found.details["regression"].numbers[name].interval == (TRUE[name], TRUE[name])
+
+
+@pytest.mark.parametrize(
+    ("name", "times", "other", "way"),
+    [("fc", 1.05, "sigma2", -1.0), ("fc", 0.9, "sigma2", 1.0), ("sigma2", 1.5, "fc", -1.0), ("sigma2", 0.5, "fc", 1.0)],
+)  # fmt: skip
+def test_beside_another_value_the_others_are_those_that_go_with_it(
+    record: Experiment, name: str, times: float, other: str, way: float
+) -> None:
+    """They stayed those of the free fit to every digit, and were called identified."""
+    _, free = identified(record)
+    _, others = identified(record, **{name: times * TRUE[name]})
+    assert way * (others[other].value - free[other].value) > 0.02 * free[other].value
+
+
+def test_least_squares_of_everything_hold_nothing(record: Experiment) -> None:
+    """The value that was given was fitted in silence."""
+    with pytest.raises(InputError, match=r"inverse=True\) fits every number: inertia cannot be held"):
+        ss.identify(
+            t=record.time,
+            position=record.position,
+            torque=record.signal(),
+            inverse=True,
+            inertia=TRUE["inertia"],
+        )
+
+
+def test_a_law_that_means_another_level_is_not_told_of_it(
+    record: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Any] = []
+
+    def spy(*a: Any, **k: Any) -> Any:
+        asked.append(k.get("known"))
+        return regress_axis(*a, **k)
+
+    identify_axis([record], AXIS, ["coulomb"], frozen=("fc",), values={"fc": 0.3}, regress=spy)
+    monkeypatch.setattr("stickslip.identify.axis.known.by_usual_names", lambda law: False)
+    identify_axis([record], AXIS, ["coulomb"], frozen=("fc",), values={"fc": 0.3}, regress=spy)
+    assert asked == [{"fc": 0.3}, None]
