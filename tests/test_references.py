@@ -145,6 +145,41 @@ def test_table_without_velocities_does_not_overshoot():
     assert rows[0, 1] == rows[-1, 1] == 0.0
 
 
+@pytest.mark.parametrize(
+    ("step", "uneven", "order"),
+    [
+        (1e-3, 0.0, 1e-5),
+        (4e-3, 0.0, 2e-4),
+        (1e-2, 0.0, 1e-3),
+        (5e-2, 0.0, 0.03),
+        (1e-3, 0.3, 3e-5),
+        (1e-2, 0.3, 3e-3),
+    ],
+)
+def test_points_of_a_smooth_motion_give_its_acceleration(step, uneven, order):
+    """Also where it turns: there it was 1.5 times the largest wrong, however dense the points."""
+    w, times = 3.0 * np.pi, np.arange(0.0, 2.0 + 0.5 * step, step)
+    times[1:-1] += uneven * step * np.random.default_rng(3).uniform(-1.0, 1.0, times.size - 2)
+    at = np.linspace(0.1, 1.9, 20001)
+    rows = Reference.table(times, 0.05 * (1.0 - np.cos(w * times))).sample(at)
+    largest = 0.05 * w * w
+    assert np.abs(rows[:, 1] - 0.05 * w * np.sin(w * at)).max() < 0.5 * order * largest / w
+    assert np.abs(rows[:, 2] - largest * np.cos(w * at)).max() < order * largest
+
+
+@given(st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=8), st.integers(2, 4), st.floats(0.1, 10.0))
+def test_a_staircase_of_any_points_has_no_overshoot(levels, repeated, step):
+    """Nor do its dwells move; a few points that bend like a parabola are taken for one."""
+    positions = np.repeat(levels, repeated + 1)
+    reference = Reference.table(step * np.arange(positions.size), positions)
+    rows = reference.sample(np.linspace(0.0, step * (positions.size - 1), 8 * positions.size))
+    assert rows[:, 0].min() >= min(levels) - 1e-12
+    assert rows[:, 0].max() <= max(levels) + 1e-12
+    for k in np.flatnonzero(np.diff(positions) == 0.0).tolist():
+        between = reference.sample(step * np.linspace(k, k + 1, 5))[:, 0]
+        assert np.abs(between - positions[k]).max() < 1e-12
+
+
 def test_bad_references_are_refused():
     with pytest.raises(UnknownName, match="did you mean 'sine'"):
         Reference("sin", amplitude=1.0)

@@ -15,6 +15,7 @@ from stickslip import plugins
 from stickslip.arguments import arguments_checked
 from stickslip.config import Table, read_toml
 from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
+from stickslip.references.through_points import velocities_through
 from stickslip.spec import Law, ReferenceKind
 from stickslip.values import Vector, call_of
 
@@ -227,7 +228,9 @@ class Reference:
         time, position : array_like, shape (n,)
             s, ascending; rad.
         velocity : array_like, shape (n,), optional
-            rad/s; if left out, of a cubic that does not overshoot the points and starts and ends at rest.
+            rad/s; if left out, the motion starts and ends at rest, and has the derivative through five points where
+            they show a smooth motion, else that of a cubic which does not overshoot them
+            (`stickslip.references.through_points`).
 
         Raises
         ------
@@ -236,7 +239,7 @@ class Reference:
             not come after the one before; or shapes that do not fit.
         """
         t, x = points(time, position)
-        v = monotone_velocities(t, x) if velocity is None else column("velocity", velocity, "rad/s", t.size)
+        v = velocities_through(t, x) if velocity is None else column("velocity", velocity, "rad/s", t.size)
         return cls("table", time=t, position=x, velocity=v)
 
     @arguments_checked
@@ -352,19 +355,3 @@ def points(time: Vector, position: Vector) -> tuple[Array, Array]:
             f"table: time[{i}] = {t[i]:.9g} s must come after time[{i - 1}] = {t[i - 1]:.9g} s; {remedy}"
         )
     return t, x
-
-
-def monotone_velocities(t: Array, x: Array) -> Array:
-    """Velocities at the points of a piecewise cubic that does not overshoot them, rad/s.
-
-    Fritsch and Butland's weighted harmonic mean of the slopes on both sides; 0 at a turning point, along a dwell
-    and at both ends, so that the motion starts and ends at rest.
-    """
-    h = np.diff(t)
-    slope = np.diff(x) / h
-    before, after = slope[:-1], slope[1:]
-    same = before * after > 0.0
-    w1, w2 = 2.0 * h[1:] + h[:-1], h[1:] + 2.0 * h[:-1]
-    inner = np.zeros(max(t.size - 2, 0))
-    inner[same] = (w1 + w2)[same] / (w1[same] / before[same] + w2[same] / after[same])
-    return np.concatenate([[0.0], inner, [0.0]])
