@@ -22,7 +22,7 @@ from stickslip.control.linear import Cascade
 from stickslip.errors import ParameterError
 from stickslip.model import Model
 from stickslip.recommend.candidate_run import AT_REST, Drive, Trial, dangers
-from stickslip.recommend.candidates import NEAR, Bench
+from stickslip.recommend.candidates import NEAR, Bench, why_lost
 from stickslip.recommend.following import simulated
 from stickslip.recommend.swings import back_and_forth, between_counts
 
@@ -216,8 +216,7 @@ def on_axes(beside: Beside, bench: Bench, where: str) -> Beside:
     errors: list[float] = []
     for i, (before, after) in enumerate(bench.trials(controller)):
         if isinstance(after, str) or isinstance(before, str):
-            why = after if isinstance(after, str) else "the linear controller alone fails"
-            return replace(beside, errors=tuple(errors), why_not=why + where.rstrip())
+            return replace(beside, errors=tuple(errors), why_not=why_lost(before, after) + where.rstrip())
         errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
         beside = replace(beside, learned=beside.learned or after.learned)
         unsafe = unsafe_at(beside, before, after, bench.drive)

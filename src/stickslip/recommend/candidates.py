@@ -251,8 +251,7 @@ class Bench:
         errors: list[float] = []
         for before, after in self.trials(controller):
             if isinstance(after, str) or isinstance(before, str):
-                why = after if isinstance(after, str) else "the linear controller alone fails"
-                return Candidate(setting, (*errors, math.inf), (why,))
+                return Candidate(setting, (*errors, math.inf), (why_lost(before, after),))
             errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
             unsafe = tuple(dangers(before, after, self.drive, setting.kind == "feedforward"))
             if not unsafe and setting.kind == "feedback" and self.swings_on(len(errors) - 1, controller):
@@ -274,6 +273,14 @@ class Bench:
             return self._pushed[i]
 
         return swings_on(plant, controller, self.drive, least, alone)
+
+
+def why_lost(before: Trial | str, after: Trial | str) -> str:
+    """Why an axis is not held, of the linear controller alone and with a compensator: what fails alone is not the
+    compensator's."""
+    if isinstance(before, str):
+        return f"the linear controller alone fails ({before})"
+    return after if isinstance(after, str) else ""
 
 
 def lost(trial: Trial | str, best: Trial | str, drive: Drive) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from stickslip.analyse.wording import ends
@@ -94,16 +96,33 @@ def held(found: Identified, alone: Trial | str, drive: Drive, inertia: float | N
 
 def unsure_inertia(found: Identified) -> str:
     """That a loop may be unstable on the model's inertia and not on the axis's; empty where the record tells it."""
+    said, unit = inertia_said(found), found.unit("kg·m²")
+    if not said:
+        return ""
+    own = f"give that with --inertia in {unit} (Python: inertia=)"
+    return f"{said}, and the loop may be stable on the axis's own: {own}, "
+
+
+def doubted_inertia(found: Identified) -> Iterator[str]:
+    """That no setting suits every inertia that the record allows, and the remedy; nothing where the record tells it."""
+    if said := inertia_said(found):
+        own = f"Give the axis's own with --inertia in {found.unit('kg·m²')} (Python: inertia=)"
+        yield (
+            f"{said[0].upper()}{said[1:]}: loop and feedforward are made for that one number, and tried on all that "
+            "the sampled axes have. Where the table says that an axis is not held, that is the likely reason. "
+            f"{own}, or identify a record with stronger accelerations."
+        )
+
+
+def inertia_said(found: Identified) -> str:
+    """The model's inertia and its interval where the record does not tell it; empty where it does."""
     told = next((e for e in found.estimates if e.name == "inertia"), None)
     if told is None or (told.identified and told.upper <= RATIO * told.lower):
         return ""
     unit, of = found.unit("kg·m²"), "is not identified" if not told.identified else "is hardly determined"
     value = found.axis.get("inertia", told.value)
     interval = ", ".join(ends(value, told.lower, told.upper, ".3g"))
-    return (
-        f"the model's inertia {value:.3g} {unit} {of} [{interval}], and the loop may be stable "
-        f"on the axis's own: give that with --inertia in {unit} (Python: inertia=), "
-    )
+    return f"the model's inertia {value:.3g} {unit} {of} [{interval}]"
 
 
 def refuse_endless(trials: int, drive: Drive, axes: int, confirm: int) -> None:
