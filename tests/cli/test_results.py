@@ -302,5 +302,5 @@ def test_a_motion_of_another_log_is_taken(
     model = written(tmp_path / "m.toml")
     assert main(["recommend", str(model), "--motion", str(log), "--axes=1", "--confirm=0", "--json"]) == 0
     motion = json.loads(capsys.readouterr().out)["drive"]["motion"]
-    assert motion["source"] == "position of cycle.csv, 0 to 2 s"
+    assert motion["source"] == "points of cycle.csv, 0 to 2 s"
     assert motion["amplitude"] == pytest.approx(0.3, rel=1e-3)

@@ -127,7 +127,7 @@ def test_beside_control_laws_the_inertia_feedforward_alone_holds_no_friction_law
 def test_where_nothing_is_recommended_the_safe_ones_are_told_why_not() -> None:
     """A list of what is unsafe was the whole reason, where the safe feedforwards had been hardly worth it."""
     drive = Drive(20.0, amplitude=0.5, frequency=2.0, torque_limit=3.0, encoder_counts=4096.0)
-    advice = recommend(identified(0.002, 0.005), drive, axes=1, confirm=2, feed_inertia=False)
+    advice = recommend(identified(0.004, 0.005), drive, axes=1, confirm=2, feed_inertia=False)
     assert advice.chosen is None
     safe = [c for c in advice.candidates if not c.unsafe]
     assert safe

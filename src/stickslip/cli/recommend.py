@@ -10,11 +10,11 @@ stickslip recommend model.toml --loop kp=8,ki=60,kd=0.08,kr=0.08,limit=3 --motio
 
 Simulates the linear controller alone (the given loop, or PD or PID by pole placement) and every candidate (inertia
 feedforward alone; law, feedforward or feedback, gain, dead band) on the best estimate and on axes sampled from the
-model's intervals. The motion is that of the log, or a given one, followed by a standstill; sampling is that of the
-drive. The recommended candidate has a limit cycle on none of these axes; of those within a tenth of the smallest error
-on the worst axis, it is the one with the lowest gain; where friction compensation takes less than a tenth of what the
-inertia feedforward alone leaves, it is that alone. It is then simulated on further sampled axes; the error reduction
-printed is the one found there.
+model's intervals. The motion is that of the log, or a given one, from rest to rest, followed by a standstill; one that
+never rests is begun and braked smoothly, which is not judged. Sampling is that of the drive. The recommended candidate
+has a limit cycle on none of these axes; of those within a tenth of the smallest error on the worst axis, it is the one
+with the lowest gain; where friction compensation takes less than a tenth of what the inertia feedforward alone leaves,
+it is that alone. It is then simulated on further sampled axes; the error reduction printed is the one found there.
 """
 
 from __future__ import annotations

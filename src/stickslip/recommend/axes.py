@@ -4,7 +4,8 @@ Drawn are the identified numbers (friction, inertia, offset) from their interval
 machine has: a torque over the position of up to the misfit of the model, a current loop, a delay below one sample, and
 friction that comes later than the contact's own springs bring it (an elastic drivetrain, backlash), and a reference
 velocity of the instant or of the sample before. Where the record told motor and load behind a spring, they are drawn
-from its intervals, with friction at the load.
+from its intervals, with friction at the load. On the best estimate the reference velocity is formed as the measured one
+is, the mean over the sample before: half a sample of difference between them acts as inertia that is fed forward.
 """
 
 from __future__ import annotations
@@ -93,6 +94,7 @@ def plants_of(
         found.model,
         offset=known["offset"],
         waves=_hanging(known["gravity"], known["gravity_angle"], start),
+        backward=True,
         flexible=found.train.axis(inertia) if found.train else None,
         machine=machine,
     )

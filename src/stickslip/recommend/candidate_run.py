@@ -19,6 +19,7 @@ from stickslip.errors import ParameterError
 from stickslip.identify.motion import HOLD, Motion, sinusoid
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
+from stickslip.recommend.course import Course, course_of
 from stickslip.recommend.following import followed, setpoints_of, simulated
 from stickslip.recommend.plant import Plant
 from stickslip.recommend.swings import above, repeats, reversals, turns
@@ -136,7 +137,7 @@ class Drive:
     @property
     def steps(self) -> float:
         """Steps of the simulations of one axis, about: the motion, the rest behind it, what is held at rest."""
-        return (self.path.duration + HOLD + len(STARTS) * HELD) / min(5e-4, self.sample_time)
+        return (self.course.whole.duration + HOLD + len(STARTS) * HELD) / min(5e-4, self.sample_time)
 
     def deadband(self, counts: float) -> float:
         """The velocity of so many counts of the encoder per sample time, rad/s; 0 where it measures exactly."""
@@ -159,32 +160,41 @@ class Drive:
 
     @cached_property
     def path(self) -> Motion:
-        """The motion: `motion`, or the sinusoid.
+        """The motion that is judged: `motion`, or its part from rest to rest, or the sinusoid.
 
         Raises
         ------
         ParameterError
             If there is neither.
         """
+        return self.course.judged
+
+    @cached_property
+    def course(self) -> Course:
+        """The motion with what brings the axis up to speed before it and to rest behind it.
+
+        Raises
+        ------
+        ParameterError
+            As of `path`.
+        """
         if self.motion is not None:
-            return self.motion
+            return course_of(self.motion)
         if self.amplitude is None:
             raise ParameterError(
                 "drive: there is no motion to try a setting along; give a motion or an amplitude"
             )
-        return sinusoid(self.amplitude, self.frequency)
+        return course_of(sinusoid(self.amplitude, self.frequency))
 
     @cached_property
     def reference(self) -> Array:
         """Position, velocity and acceleration of the motion at every sample, shape (n, 3), `HOLD` at rest behind it."""
-        return self.path.sampled(self.sample_time)
+        return self.course.sampled(self.sample_time)
 
     @cached_property
     def reference_backward(self) -> Array:
         """The same, its velocity the mean over the sample before."""
-        out = self.reference.copy()
-        out[:, 1] = np.diff(out[:, 0], prepend=out[0, 0]) / self.sample_time
-        return out
+        return self.course.backward(self.reference, self.sample_time)
 
     @cached_property
     def setpoints(self) -> Array:
@@ -211,7 +221,13 @@ class Drive:
             "gains": self.gains._asdict() if self.gains else None,
             "controller": self.controller.as_dict() if self.controller else None,
             "machine": self.machine.name if self.machine else None,
-            "motion": {"source": path.source, "amplitude": path.amplitude, "duration": path.duration},
+            "motion": {
+                "source": path.source,
+                "amplitude": path.amplitude,
+                "duration": path.duration,
+                "run_up": self.course.run_up,
+                "braking": self.course.braking,
+            },
         }
 
 
@@ -298,13 +314,13 @@ def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
     if position is None:
         return "position or velocity left every reasonable bound"
     time = controller.sample_time
-    moving = len(reference) - round(HOLD / time)
+    judged = drive.course.rows_judged(len(reference), time)
     velocity = np.diff(position, append=position[-1]) / time
     return Trial(
         {
-            "position_rms_rad": math.sqrt(float(np.mean((reference[:moving, 0] - position[:moving]) ** 2))),
+            "position_rms_rad": math.sqrt(float(np.mean((reference[judged, 0] - position[judged]) ** 2))),
             "velocity_above_50Hz_rms_rad_s": above(velocity, FAST, time),
-            "speed_rms_rad_s": math.sqrt(float(np.mean(reference[:moving, 1] ** 2))),
+            "speed_rms_rad_s": math.sqrt(float(np.mean(reference[judged, 1] ** 2))),
         },
         position, np.ascontiguousarray(reference[:, 0]), time, after(controller, state, time),
     )  # fmt: skip

@@ -29,6 +29,7 @@ from stickslip.recommend.candidates import (
     on_both,
     rings_alone,
 )
+from stickslip.recommend.motion_notes import by_reference_velocity, on_motion
 from stickslip.recommend.notes import (
     ALLOWANCE,
     UNSURE,
@@ -43,7 +44,7 @@ from stickslip.recommend.notes import (
 from stickslip.recommend.plant import Plant
 from stickslip.recommend.question import cautious, inertia_of, laws_of, with_motion
 from stickslip.recommend.recommendation import Recommendation
-from stickslip.recommend.refusals import held, refuse_endless, refuse_unknown, refuse_weak
+from stickslip.recommend.refusals import doubted_inertia, held, refuse_endless, refuse_unknown, refuse_weak
 
 GAINS = (0.5, 0.7, 0.8, 0.9, 1.0)
 BEYOND = (1.1, 1.25, 1.5)
@@ -127,12 +128,13 @@ def recommend(
         hunts = limit_cycle(chosen.setting.on(linear, laws[chosen.setting.law]), bench, 0) if chosen else ""
     account.end()
     notes = [
-        *sampled_as(drive, chosen), *axes_left_out(bench, others, found),
-        *lag_of(bench.plants[0], first, linear, drive),
+        *sampled_as(drive, chosen), *on_motion(drive, found.unit("rad")), *axes_left_out(bench, others, found),
+        *lag_of(bench.plants[0], first, linear, drive), *by_reference_velocity(chosen, others.plants),
         *notes_on(
             found, chosen, choice.candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine,
         ),
         *beyond_inertia(chosen, choice.friction, choice.candidates),
+        *(doubted_inertia(found) if chosen is None and inertia is None else ()),
     ]  # fmt: skip
     return Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, linear.numbers(),
@@ -204,7 +206,7 @@ def drawn(found: Identified, inertia: float | None, count: int, seed: int, empty
     linear, drive, laws, ran = empty.linear, empty.drive, empty.laws, empty.ran
     own = drive.given  # Only of a loop that somebody runs is it known that it holds the axis.
     plants = plants_of(
-        found, inertia_of(found, inertia), (TRIES if own else 1) * count, seed, float(drive.path.position[0]),
+        found, inertia_of(found, inertia), (TRIES if own else 1) * count, seed, float(drive.course.whole.position[0]),
         inertia is not None, drive.machine,
     )  # fmt: skip
     return (

@@ -9,6 +9,7 @@ from stickslip.control.learned import told
 from stickslip.control.registry import control_law
 from stickslip.model import Model
 from stickslip.recommend.candidates import Candidate, Setting
+from stickslip.recommend.course import measured
 from stickslip.recommend.notes import ALLOWANCE
 from stickslip.recommend.recommendation import Recommendation
 
@@ -24,10 +25,14 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
         out.append(f"{x.label:<16}{x.kind:<13}{x.gain:>5.3g}  {x.deadband:>{wide}.3g}  {100 * c.errors[0]:>8.1f} %  "
               f"{100 * c.worst:>5.1f} %  {mark}{safety(c)}")  # fmt: skip
     out.append("")
-    path = result.drive.path
-    out.append(
-        f"motion:            {path.source}; {path.duration:.3g} s, up to {path.top_speed:.3g} {unit('rad/s')}"
-    )
+    path, course = result.drive.path, result.drive.course
+    speed = f", up to {path.top_speed:.3g} {unit('rad/s')}" if path.top_speed else ""
+    said = [f"{path.source}; {path.duration:.3g} s{speed}"]
+    if measured(path):
+        said.append("what the axis did, which need not be the drive's reference")
+    if course.jumps:
+        said.append(f"{len(course.jumps)} steps of up to {course.highest_jump:.3g} {unit('rad')}")
+    out.append(f"motion:            {'; '.join([*said, *([course.said] if course.said else [])])}")
     units = {f.name: f.par.unit for kind in ("gains", "cascade") for f in control_law(kind).fields}
     gains = ", ".join(
         f"{k} {v:.5g} {unit(units[k]) if units.get(k, '-') != '-' else ''}".rstrip()

@@ -25,6 +25,7 @@ from stickslip.machines.machine import Machine
 from stickslip.readers.reading import read
 from stickslip.recommend import recommend as setting
 from stickslip.recommend.candidate_run import Drive
+from stickslip.recommend.course import measured
 from stickslip.recommend.sample_time import sample_time_for
 from stickslip.verbs.compare import IdentifiedModel, identified_of
 from stickslip.verbs.reading import Log, open_log
@@ -38,6 +39,9 @@ USUAL: Mapping[str, Any] = {
     "sample_time": None,
 }
 """What `recommend` takes where nothing is given."""
+
+FORCES = ("motor_torque", "current", "voltage")
+"""Channels beside which a position is what an axis did."""
 
 
 @arguments_checked
@@ -99,7 +103,8 @@ def recommend(
     torque_limit : float
         N·m
     motion : log, optional
-        Time and position of the motion that matters; that of the identification's log unless given.
+        Time and position of the motion that matters; that of the identification's log unless given. Tried from rest
+        to rest; one that never rests is begun and braked smoothly, which is not judged.
     amplitude, frequency : float, optional
         Of a slow sinusoid as the motion instead, rad (m) and Hz (0.5).
     inertia : float, optional
@@ -337,5 +342,11 @@ def motion_in(log: Log) -> Motion:
     """The motion of a log or of a table of points."""
     if isinstance(log, (str, os.PathLike)):
         path = Path(cast("str", log))
-        return motion_of(read(path), path.name)
-    return motion_of(open_log(log, {}).record, "the motion given")
+        record, name = read(path), path.name
+    else:
+        record, name = open_log(log, {}).record, "the motion given"
+    motion = motion_of(record, name)
+    if measured(motion) and not set(FORCES) & set(record.channels):
+        # Times and positions alone, without a torque, are what somebody wants the axis to do.
+        return replace(motion, source=f"points{motion.source.removeprefix('position')}")
+    return motion
