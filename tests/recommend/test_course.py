@@ -19,7 +19,9 @@ from stickslip.recommend.candidates import Bench, Candidate, Setting
 from stickslip.recommend.course import course_of
 from stickslip.recommend.motion_notes import by_reference_velocity, on_motion
 from stickslip.recommend.plant import Plant
+from stickslip.recommend.recommendation import Recommendation
 from stickslip.recommend.refusals import doubted_inertia
+from stickslip.report.recommendation_text import reduction
 from stickslip.verbs.recommend import motion_in
 
 T = 1e-3
@@ -183,6 +185,12 @@ def test_a_measured_motion_is_told_from_the_drives_reference(tmp_path: Path) -> 
     (said,) = on_motion(Drive(10.0, motion=did), "rad")
     assert said.startswith("The motion is the measured position, smoothed, since its log has no reference.")
     assert "--motion" in said
+    chosen = Candidate(Setting("coulomb", "feedforward", 0.8), (0.1, 0.1, 0.12), ())
+    promised, plain = (
+        reduction(Recommendation(chosen, None, {}, 1e-3, 1.5, 2.0, (), 1, drive=Drive(10.0, motion=motion)))
+        for motion in (did, asked)
+    )
+    assert promised == f"{plain}, along the motion as measured"
 
 
 def test_the_best_estimate_forms_its_reference_velocity_as_the_measured_one() -> None:
