@@ -14,7 +14,7 @@ from stickslip.identify.motion import HOLD, Motion
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 from stickslip.recommend.axes import plants_of
-from stickslip.recommend.candidate_run import Drive, Trial, run
+from stickslip.recommend.candidate_run import LEFT, Drive, Trial, run
 from stickslip.recommend.candidates import Bench, Candidate, Setting
 from stickslip.recommend.course import course_of
 from stickslip.recommend.motion_notes import by_reference_velocity, on_motion
@@ -203,16 +203,21 @@ def test_the_best_estimate_forms_its_reference_velocity_as_the_measured_one() ->
     assert "11 % of the error on half of the sampled axes where it is the difference of two setpoints" in said
     assert "45 % where it is the velocity of the instant; the difference of two setpoints is better" in said
     alike = replace(chosen, errors=(0.1, 0.1, 0.12, 0.12, 0.1))
+    spread = replace(chosen, errors=(0.1, 0.1, 0.09, 0.12, 0.5))
     assert not list(by_reference_velocity(alike, plants))
+    assert not list(by_reference_velocity(spread, plants))
     assert not list(by_reference_velocity(None, plants))
 
 
 def test_an_unknown_inertia_is_named_as_the_reason_for_no_recommendation() -> None:
     found = identified(0.1, 0.02)
-    assert not list(doubted_inertia(found))
+    lost = Candidate(Setting("coulomb", "feedforward", 0.8), (0.1,), (f"{LEFT} on an axis sampled later",))
+    calm = replace(lost, unsafe=("rough motion",))
+    assert not list(doubted_inertia(found, [lost]))
     (told,) = [e for e in found.estimates if e.name == "inertia"]
     unsure = replace(found, estimates=tuple(replace(e, identified=e is not told) for e in found.estimates))
-    (said,) = doubted_inertia(unsure)
+    assert not list(doubted_inertia(unsure, [calm]))
+    (said,) = doubted_inertia(unsure, [calm, lost])
     assert said.startswith("The model's inertia")
     assert "is not identified" in said
     assert "--inertia" in said

@@ -27,6 +27,7 @@ from stickslip.recommend.swings import above, repeats, reversals, turns
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 AT_REST = "limit cycle at rest"
+LEFT = "position or velocity left every reasonable bound"
 
 BUSY = 1.0
 """Reversals per second beyond those of the linear controller alone from which an axis hunts."""
@@ -312,7 +313,7 @@ def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
     reference = drive.reference_backward if backward else drive.reference
     position, state = followed(plant, controller, drive.setpoints_backward if backward else drive.setpoints)
     if position is None:
-        return "position or velocity left every reasonable bound"
+        return LEFT
     time = controller.sample_time
     judged = drive.course.rows_judged(len(reference), time)
     velocity = np.diff(position, append=position[-1]) / time

@@ -134,7 +134,7 @@ def recommend(
             found, chosen, choice.candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine,
         ),
         *beyond_inertia(chosen, choice.friction, choice.candidates),
-        *(doubted_inertia(found) if chosen is None and inertia is None else ()),
+        *(doubted_inertia(found, choice.candidates) if chosen is None and inertia is None else ()),
     ]  # fmt: skip
     return Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, linear.numbers(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -10,8 +10,8 @@ from stickslip.analyse.wording import ends
 from stickslip.errors import InputError
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.identified_file import Identified
-from stickslip.recommend.candidate_run import Drive, Trial
-from stickslip.recommend.candidates import breakaway, resistance
+from stickslip.recommend.candidate_run import LEFT, Drive, Trial
+from stickslip.recommend.candidates import Candidate, breakaway, resistance
 
 MOST_STEPS = 1e10
 """Of all simulations together; more would take half a day."""
@@ -103,13 +103,15 @@ def unsure_inertia(found: Identified) -> str:
     return f"{said}, and the loop may be stable on the axis's own: {own}, "
 
 
-def doubted_inertia(found: Identified) -> Iterator[str]:
-    """That no setting suits every inertia that the record allows, and the remedy; nothing where the record tells it."""
-    if said := inertia_said(found):
+def doubted_inertia(found: Identified, candidates: Sequence[Candidate]) -> Iterator[str]:
+    """That no loop suits every inertia that the record allows, and the remedy; nothing where the record tells it, or
+    the sampled axes were held."""
+    lost = any(LEFT in said for c in candidates for said in c.unsafe)
+    if lost and (said := inertia_said(found)):
         own = f"Give the axis's own with --inertia in {found.unit('kg·m²')} (Python: inertia=)"
         yield (
-            f"{said[0].upper()}{said[1:]}: loop and feedforward are made for that one number, and tried on all that "
-            "the sampled axes have. Where the table says that an axis is not held, that is the likely reason. "
+            f"{said[0].upper()}{said[1:]}: loop and feedforward are made for that number, and tried on axes with all "
+            "that the interval allows, up to a factor of 9. Most likely this is why axes are not held there. "
             f"{own}, or identify a record with stronger accelerations."
         )
 

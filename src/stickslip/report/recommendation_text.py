@@ -31,7 +31,8 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
     if measured(path):
         said.append("what the axis did, which need not be the drive's reference")
     if course.jumps:
-        said.append(f"{len(course.jumps)} steps of up to {course.highest_jump:.3g} {unit('rad')}")
+        steps = f"{len(course.jumps)} steps of up to" if len(course.jumps) > 1 else "a step of"
+        said.append(f"{steps} {course.highest_jump:.3g} {unit('rad')}")
     out.append(f"motion:            {'; '.join([*said, *([course.said] if course.said else [])])}")
     units = {f.name: f.par.unit for kind in ("gains", "cascade") for f in control_law(kind).fields}
     gains = ", ".join(
