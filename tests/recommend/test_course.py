@@ -203,7 +203,7 @@ def test_the_best_estimate_forms_its_reference_velocity_as_the_measured_one() ->
     assert "11 % of the error on half of the sampled axes where it is the difference of two setpoints" in said
     assert "45 % where it is the velocity of the instant; the difference of two setpoints is better" in said
     alike = replace(chosen, errors=(0.1, 0.1, 0.12, 0.12, 0.1))
-    spread = replace(chosen, errors=(0.1, 0.1, 0.09, 0.12, 0.5))
+    spread = replace(chosen, errors=(0.1, 0.05, 0.12, 0.3, 0.5))
     assert not list(by_reference_velocity(alike, plants))
     assert not list(by_reference_velocity(spread, plants))
     assert not list(by_reference_velocity(None, plants))

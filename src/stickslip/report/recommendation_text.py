@@ -170,8 +170,8 @@ def reduction(result: Recommendation) -> str:
         f"{best} on the best estimate, at least {usual} on half of the sampled axes; "
         f"{100.0 * result.confidence:.0f} % interval {percent(*result.reduction)}, "
         f"safe on all {result.confirmed_on} sampled axes (Monte Carlo)"
-        + (", but for the linear controller's own oscillation" if result.rings else "")
         + (", along the motion as measured" if measured(result.drive.path) else "")
+        + (", but for the linear controller's own oscillation" if result.rings else "")
     )
 
 
