@@ -15,7 +15,7 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.parameter_vector import Parameter
 from stickslip.identify.regression.regression import Regression, regress_axis
 from stickslip.machines.servo import ServoAxis
-from stickslip.report.answers import trusted
+from stickslip.report.answers import doubts, trusted
 from stickslip.report.sliding_torque import sliding_of
 from stickslip.spec import Par
 
@@ -59,11 +59,11 @@ def test_a_law_without_the_fall_that_shows_is_taken_with_care(logs: Any) -> None
     assert fall["fall_missing_Nm"] == pytest.approx(truth["fs"] - truth["fc"], rel=0.25)
     assert 0.5 * truth["vs"] < fall["fall_missing_velocity"] < 2.0 * truth["vs"]
     assert fall["sliding_rms_Nm"] > 1.2 * named["stribeck"].misfit["sliding_rms_Nm"]
-    said = trusted(named["coulomb"], sliding_of(named["coulomb"]))
+    said = trusted(named["coulomb"], doubts(named["coulomb"], sliding_of(named["coulomb"])))
     assert said.startswith("With care: ")
     assert "friction falls by " in said
     assert "law 'coulomb' does not have" in said
-    assert "fall" not in trusted(named["stribeck"], sliding_of(named["stribeck"]))
+    assert "fall" not in "; ".join(doubts(named["stribeck"], sliding_of(named["stribeck"])))
 
 
 def test_of_several_laws_one_with_the_fall_that_shows_is_taken(logs: Any) -> None:

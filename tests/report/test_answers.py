@@ -15,6 +15,7 @@ import pytest
 from stickslip import Model
 from stickslip.finding import Finding
 from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.axis.result import on_untold
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
@@ -190,9 +191,12 @@ def test_a_loop_that_is_simulated_is_told_beside_the_torque() -> None:
 def test_what_speaks_against_it_is_said(misfit: dict[str, float], findings: Any, doubt: str) -> None:
     found = identified()
     doubted = dataclasses.replace(found, misfit={**found.misfit, **misfit}, findings=findings)
-    said = answers_of(doubted, [log()]).trust
-    assert said.startswith("With care: ")
-    assert doubt in said
+    answers = answers_of(doubted, [log()])
+    assert answers.trust.startswith("With care: ")
+    assert doubt in answers.trust
+    assert doubt in " ".join(answers.as_dict()["doubts"])
+    assert answers.as_dict()["trust"] == answers.trust
+    assert answers_of(found, [log()]).as_dict()["doubts"] == []
 
 
 def test_a_model_that_misses_the_torque_is_not_called_right() -> None:
@@ -280,3 +284,22 @@ def test_a_constant_torque_may_be_friction_that_differs_by_direction() -> None:
     assert said in answers_of(found, [log()]).evidence
     small = [dataclasses.replace(e, value=0.01 * FC) if e.name == "offset" else e for e in found.estimates]
     assert either_way(dataclasses.replace(found, estimates=tuple(small))) == []
+
+
+def test_one_number_is_spoken_of_as_one_and_several_as_several() -> None:
+    """ "Not identified: sigma2; the model's values of them are one choice among many"."""
+    why = "the data do not distinguish it from 0"
+    one = Estimate("fc", "N·m", "F_C", 0.3, 0.1, 0.0, 0.5, False, why)
+    two = dataclasses.replace(one, name="sigma2")
+    assert one_number_each([one]) == [f"fc not identified: {why}"]
+    assert one_number_each([one, two]) == [
+        "fc, sigma2 not identified: the data do not distinguish them from 0"
+    ]
+    assert one_number_each([dataclasses.replace(e, verdict="") for e in (one, two)]) == [
+        "fc, sigma2 not identified: the data do not determine them"
+    ]
+    assert on_untold([]) == []
+    assert on_untold(["fc"]) == [
+        "Not identified: fc; the model's value of it is one choice of many that fit as well."
+    ]
+    assert "values of these are" in on_untold(["fc", "sigma2"])[0]

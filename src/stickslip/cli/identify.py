@@ -208,10 +208,15 @@ def run(args: argparse.Namespace) -> int:
         print(line)
     for what, path in made.items():
         print(f"{what.partition('_')[0]}: {path}")
-    for path in dict.fromkeys(s.record.meta["reading"].get("profile", "") for s in result.sources):
-        if path:
-            print(f"profile: {path}")
+    for path in profiles(result):
+        print(f"profile: {path}")
     return 0
+
+
+def profiles(result: IdentificationResult) -> list[str]:
+    """The saved profiles with which the logs were read, each once."""
+    found = dict.fromkeys(s.record.meta["reading"].get("profile", "") for s in result.sources)
+    return [path for path in found if path]
 
 
 def options_of(args: argparse.Namespace) -> dict[str, Any]:
@@ -245,6 +250,7 @@ def as_data(result: IdentificationResult, made: Mapping[str, Path], answers: Ans
         **result.as_dict(), "data": [s.about for s in result.sources],
         "findings": {s.name: [f.as_data() for f in s.findings] for s in result.sources},
         **{k: str(v) for k, v in made.items()}, "next": [s.command for s in answers.steps if s.command],
+        "steps": [{"what": s.what, "command": s.command} for s in answers.steps], "profiles": profiles(result),
     }  # fmt: skip
 
 

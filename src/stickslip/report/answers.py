@@ -6,6 +6,7 @@ The head of the report and what `stickslip identify` prints are made of these se
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +39,8 @@ AMPLITUDE = 0.02
 """Part of friction's level that a torque over the position must be for it to be told. What the form of a law leaves
 repeats with the motion, and so over the position: of 43 orders that no machine had, found beside whole turns in 144
 logs with cogging (`benchmarks/ordinary_logs.py`), 39 were smaller, and none of 256 that were there."""
+OF_ONE = re.compile(r"\b(determines?|distinguish) it\b")
+"""How a verdict speaks of its number."""
 MOST_NAMED = 4
 """Orders that one may be as well."""
 OWN_WORDS = {
@@ -64,6 +67,8 @@ class Answers:
         What to do now, the first first.
     told : tuple of str
         Notes of the result that these say already.
+    doubts : tuple of str
+        What speaks against the numbers, as `trust` names it; empty where nothing does.
     """
 
     friction: tuple[str, ...]
@@ -71,6 +76,11 @@ class Answers:
     evidence: tuple[str, ...]
     steps: tuple[Step, ...]
     told: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Trust, doubts and evidence as plain data for JSON and TOML."""
+        return {"trust": self.trust, "doubts": list(self.doubts), "evidence": list(self.evidence)}
 
 
 def answers_of(
@@ -91,9 +101,10 @@ def answers_of(
     sliding = sliding_of(found)
     timing = [s for s in timing_of(found) if s in found.notes]
     missing = tuple(s for s in found.notes if s.startswith("Not identified: "))
+    reasons = tuple(doubts(found, sliding))
     return Answers(
-        tuple(friction_in(found, records)), trusted(found, sliding), (*evidence(found, sliding), *timing),
-        tuple(next_steps(found, records, model_file, files)), (*timing, *missing),
+        tuple(friction_in(found, records)), trusted(found, reasons), (*evidence(found, sliding), *timing),
+        tuple(next_steps(found, records, model_file, files)), (*timing, *missing), reasons,
     )  # fmt: skip
 
 
@@ -170,9 +181,14 @@ def one_number_each(estimates: Iterable[Estimate]) -> list[str]:
         if not e.identified:
             reasons.setdefault(e.verdict, []).append(e.name)
     return [
-        f"{', '.join(names)} not identified: {why or 'the data do not determine it'}"
-        for why, names in reasons.items()
+        f"{', '.join(names)} not identified: {of_several(why, names)}"
+        for why, names in ((why or "the data do not determine it", names) for why, names in reasons.items())
     ]
+
+
+def of_several(why: str, names: Sequence[str]) -> str:
+    """A verdict on one number, said of all of these."""
+    return why if len(names) == 1 else OF_ONE.sub(r"\1 them", why)
 
 
 # ---- can I trust it -------------------------------------------------------------------------------------------------
@@ -184,8 +200,8 @@ def timing_of(found: Identification) -> list[str]:
     return on_timing(regression) if isinstance(regression, Regression) else []
 
 
-def trusted(found: Identification, sliding: Sliding | None) -> str:
-    """Whether the numbers can be trusted, in a line."""
+def trusted(found: Identification, reasons: Sequence[str]) -> str:
+    """Whether the numbers can be trusted, in a line; `reasons` speak against them."""
     good = [e.name for e in found.estimates if e.identified]
     bad = [e.name for e in found.estimates if not e.identified]
     if not found.estimates:
@@ -193,7 +209,6 @@ def trusted(found: Identification, sliding: Sliding | None) -> str:
     if not good:
         return "No: none of the numbers is identified."
     rest = f"; not {', '.join(bad)}" if bad else ""
-    reasons = doubts(found, sliding)
     if reasons:
         return f"With care: {'; '.join(reasons)}{rest}."
     if bad:

@@ -140,7 +140,7 @@ def rendered(
         sources=[source(s) for s in sources],
         columns=columns, rows=rows, parts=parts,
         correlation=correlation(found),
-        result=json.dumps(found.as_dict(), indent=1, default=str, ensure_ascii=False),
+        result=json.dumps(found.as_dict() | answers.as_dict(), indent=1, default=str, ensure_ascii=False),
     )  # fmt: skip
 
 

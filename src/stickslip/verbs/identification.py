@@ -240,9 +240,10 @@ class IdentificationResult:
         return [s.about for s in self.sources]
 
     def _recorded(self) -> dict[str, Any]:
-        """Tables of what the records hold besides friction: the first motion, the speeds, the side of the gear."""
+        """How far the numbers can be trusted; and what the records hold besides friction: the first motion, the speeds,
+        the side of the gear."""
         fitted = [s for s in self.sources if not s.held_out and "position" in s.record.channels]
-        out: dict[str, Any] = {}
+        out: dict[str, Any] = self.answers.as_dict()
         if fitted and (speeds := speeds_of([s.record for s in fitted])):
             out["speeds"] = speeds
         for source in fitted:
@@ -259,8 +260,9 @@ class IdentificationResult:
     # ---- words ----------------------------------------------------------------------------------------------------
 
     def as_dict(self) -> dict[str, Any]:
-        """Law, estimates, correlation, misfit and sentences as plain data."""
-        return self.identification.as_dict()
+        """Law, estimates, correlation, misfit and sentences as plain data; ``trust`` is `verdict`, ``doubts`` what it
+        names against the numbers (empty where nothing speaks against them), ``evidence`` why."""
+        return {**self.identification.as_dict(), **self.answers.as_dict()}
 
     def to_pandas(self) -> pandas.DataFrame:
         """The parameters as a data frame: value, lower, upper, unit, identified, verdict.

@@ -271,13 +271,17 @@ def untold_by_reversals(
 
 def noted(found: Identification, *more: str) -> Identification:
     """The same with these notes, and which parameters are not identified."""
-    missing = [e.name for e in found.estimates if not e.identified]
-    last = (
-        [f"Not identified: {', '.join(missing)}; the model's values of them are one choice among many."]
-        if missing
-        else []
-    )
+    last = on_untold([e.name for e in found.estimates if not e.identified])
     return replace(found, notes=(*found.notes, *more, *strange_loop(found), *rising(found.estimates), *last))
+
+
+def on_untold(names: Sequence[str]) -> list[str]:
+    """What the model's values of numbers that are not identified are worth, in a sentence; nothing where there are
+    none."""
+    if not names:
+        return []
+    whose = "value of it is" if len(names) == 1 else "values of these are"
+    return [f"Not identified: {', '.join(names)}; the model's {whose} one choice of many that fit as well."]
 
 
 def strange_loop(found: Identification) -> list[str]:
