@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import butter, lfilter
 
-from stickslip.identify.doctor.timing import velocity_late
+from stickslip.identify.doctor.velocity import velocity_late, velocity_scale
 from stickslip.identify.doctor.view import View
 from stickslip.record import Record
 
@@ -59,3 +59,34 @@ def test_rows_of_another_cycle_are_counted(rows):
     (message,) = told(position(), np.gradient(position(late=rows / RATE), T))
     assert f"({abs(rows):g} rows)" in message
     assert message.startswith("velocity lags" if rows > 0 else "velocity leads")
+
+
+UNITS = {"position": "rad", "velocity": "rad/s", "motor_torque": "N·m"}
+
+
+def findings(q, v, rows=slice(None)):
+    """Codes of what both checks say of some rows."""
+    view = View(Record(T[rows], {"position": q[rows], "velocity": v[rows], "motor_torque": v[rows]}, UNITS))
+    return [f.code for check in (velocity_scale, velocity_late) for f in check(view)]
+
+
+@pytest.mark.parametrize("last", [40, 50, 100, 200])
+def test_the_start_of_a_motion_does_not_tell_a_wrong_unit(last):
+    """Another program's log: ten counts at the begin, then a standstill, "velocity is 0.7454 times the change of
+    position per second" and "lags by 4.39 ms"."""
+    way = -10.0 * (1.0 - np.exp(-((T / 0.006) ** 2))) - 300.0 * np.maximum(T - 0.25, 0.0) ** 2
+    q = np.round(way) * 1.9e-4
+    assert findings(q, np.diff(q, prepend=q[0]) * RATE, slice(0, last)) == []
+
+
+@pytest.mark.parametrize("factor", [1.0, 30.0 / np.pi, 3.7, 0.6])
+def test_a_filter_and_a_delay_are_no_other_unit_but_do_not_hide_one(factor):
+    """Motion at 1.2 and 3.1 Hz, of which a low-pass of 1.5 Hz takes a fifth and a half."""
+    q = position(1.2)
+    slow = lfilter(*butter(1, 1.5, fs=RATE), np.gradient(q, T))
+    late = np.gradient(position(1.2, late=0.05), T)
+    for v in (slow, late):
+        codes = {c for c in findings(q, factor * v) if c != "velocity-late"}
+        assert codes == (
+            set() if factor == 1.0 else {"velocity-unit" if factor > 9.0 else "velocity-mismatch"}
+        )

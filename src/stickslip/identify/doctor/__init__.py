@@ -27,6 +27,7 @@ from stickslip.identify.doctor import (
     spikes,
     timing,
     units,
+    velocity,
 )
 from stickslip.identify.doctor.view import View
 from stickslip.identify.regression.regression import regress_axis
@@ -48,8 +49,8 @@ FIRST: tuple[Callable[[View], Iterator[Finding]], ...] = (
 )  # fmt: skip
 """What may be asked of any record; the other checks need enough usable rows."""
 CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
-    *FIRST, timing.scale, timing.velocity_late, units.assumed, units.counted,
-    units.degrees, units.turns, units.reference_scale, units.velocity_scale, units.too_fast, units.torque_scale,
+    *FIRST, timing.scale, velocity.velocity_late, units.assumed, units.counted,
+    units.degrees, units.turns, units.reference_scale, velocity.velocity_scale, units.too_fast, units.torque_scale,
     spikes.spikes, signals.wrapped, signals.repeated, signals.saturated, signals.supply, signals.quantised,
     magnitude.unsigned,
     physics.sign, physics.skew, physics.gravity, play.backlash, change.changes, change.temperature, excitation.moved,

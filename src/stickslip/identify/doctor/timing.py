@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor.view import Array, Smooth, View, row
+from stickslip.identify.doctor.view import View, row
 
 GAP = 5.0
 """A gap is this many times the usual distance of samples."""
@@ -21,13 +21,6 @@ UNEVEN, ROUNDED = 0.2, 1e-6
 """A distance is uneven when it differs from the usual one by more than this share, and by more than rounding."""
 JITTER = 0.02
 """Width of the middle 90 % of the distances, over their median."""
-LATE, EXPLAINS = 1.0, 0.5
-"""Rows from which on a velocity is late: one that was differenced from row to row is half a row; and the share of its
-distance from the position's change that its lateness then explains."""
-LEAST = 1e-100
-"""Of speeds, over which, and under one over which, they are no numbers of an axis."""
-LOOKS = 6
-"""At the velocity, each shifted by what the one before found."""
 
 
 def ascending(view: View) -> Iterator[Finding]:
@@ -129,53 +122,6 @@ def sampling(view: View) -> Iterator[Finding]:
             "jitter",
             f"jitter: samples are {low * 1e3:.4g} to {high * 1e3:.4g} ms apart (middle 90 %)",
         )
-
-
-def velocity_late(view: View) -> Iterator[Finding]:
-    """A velocity that a filter delays, or that is of an older row than its position."""
-    smooth = view.smooth
-    if smooth is None or not (view.has("position") and view.has("velocity")) or smooth.fast <= 0.0:
-        return
-    late, left, before = lateness(view.given_velocity, smooth)
-    rows = late / view.period
-    if abs(rows) < LATE or left > EXPLAINS * before:
-        return
-    said = "lags" if late > 0.0 else "leads"
-    why = (
-        "the drive filters it, or logs it cycles later"
-        if late > 0.0
-        else "the position is logged cycles later"
-    )
-    yield Finding(
-        "note",
-        "velocity-late",
-        f"velocity {said} the derivative of position by {abs(late) * 1e3:.3g} ms ({abs(rows):.3g} rows): {why}",
-        remedy="an axis is identified by its position; --method breakaway takes the velocity, and derives it with "
-        "--map velocity=none",
-    )
-
-
-def lateness(given: Array, smooth: Smooth) -> tuple[float, float, float]:
-    """By how much a velocity is late, s, and the mean squares of what it differs by then, and differed by before.
-
-    Least squares of given = c (v(t) - late dv/dt), about the time that the look before has found.
-    """
-    sizes = [float(np.sqrt(np.mean(x**2))) for x in (smooth.velocity, smooth.acceleration, given)]
-    if not all(LEAST < x < 1.0 / LEAST for x in sizes):
-        return 0.0, 0.0, 0.0
-    times = smooth.period * np.arange(given.size)
-    late = left = before = 0.0
-    for look in range(LOOKS):
-        v, a = (np.interp(times - late, times, x) for x in (smooth.velocity, smooth.acceleration))
-        both = np.stack([v, a])
-        scaled = np.linalg.lstsq(both.T / sizes[:2], given, rcond=None)[0]
-        size, change = (float(x) / each for x, each in zip(scaled, sizes[:2], strict=True))
-        left = float(np.mean((given - size * v) ** 2))
-        before = left if look == 0 else before
-        if size == 0.0 or look == LOOKS - 1:
-            break
-        late -= change / size
-    return late, left, before
 
 
 def finer(period: float) -> str:

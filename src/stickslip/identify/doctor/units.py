@@ -64,7 +64,7 @@ def assumed(view: View) -> Iterator[Finding]:
 
 def counted(view: View) -> Iterator[Finding]:
     """Whole numbers where an angle or a length is expected: counts."""
-    if _in_counts(view):
+    if in_counts(view):
         values = view.values("position")
         level = "warning" if view.stated("position") else "error"
         unit = view.record.units["position"]
@@ -80,7 +80,7 @@ def counted(view: View) -> Iterator[Finding]:
         )
 
 
-def _in_counts(view: View) -> bool:
+def in_counts(view: View) -> bool:
     """Whether every position is a whole number: what depends on its unit then has this one remedy."""
     if not view.has("position"):
         return False
@@ -119,7 +119,7 @@ def degrees(view: View) -> Iterator[Finding]:
 
 def turns(view: View) -> Iterator[Finding]:
     """A resolution of 1/1024, 1/2048, ... of the unit: turns. Some drives have such a step in rad, so a warning."""
-    if not view.has("position") or view.record.units["position"] != "rad" or _in_counts(view):
+    if not view.has("position") or view.record.units["position"] != "rad" or in_counts(view):
         return
     if counts := _binary_counts(view.values("position"), 1.0):
         message = (
@@ -166,63 +166,7 @@ def reference_scale(view: View) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def velocity_scale(view: View) -> Iterator[Finding]:
-    """The velocity against the derivative of the position: another unit, another sign."""
-    smooth = view.smooth
-    if smooth is None or not (view.has("position") and view.has("velocity")) or smooth.fast <= 0.0:
-        return
-    if _in_counts(view) and not view.stated("position"):
-        return
-    given = view.given_velocity
-    size = float(np.sqrt(np.mean(given**2) * np.mean(smooth.velocity**2)))
-    if size <= 0.0:
-        return
-    alike = float(np.mean(given * smooth.velocity)) / size
-    ratio = math.copysign(math.sqrt(float(np.mean(given**2) / np.mean(smooth.velocity**2))), alike)
-    unit = view.record.units["velocity"]
-    if alike < -0.6:
-        yield Finding(
-            "error",
-            "velocity-sign",
-            "velocity is positive where the position falls",
-            remedy=(
-                f"say {view.mapped('velocity', '-')}, or say --map velocity=none to derive it from the"
-                " position"
-            ),
-        )
-    if abs(alike) < 0.6:
-        yield Finding(
-            "warning",
-            "velocity-mismatch",
-            f"velocity does not follow the position (correlation {alike:.2f})",
-            remedy="check that both belong to one axis; --map velocity=none derives it from the position",
-        )
-        return
-    if 0.8 < abs(ratio) < 1.25:
-        return
-    guesses = _explained(abs(ratio), view)
-    message = (
-        f"velocity is {abs(ratio):.4g} times the change of position per second, where both are taken in SI"
-        f" ({unit})"
-    )
-    if guesses:
-        yield Finding(
-            "error",
-            guesses[0][0],
-            f"{message}: {' or '.join(g[1] for g in guesses[:2])}",
-            remedy=f"say {guesses[0][2]}",
-        )
-    else:
-        yield Finding(
-            "error",
-            "velocity-mismatch",
-            message,
-            remedy="check both units, and whether one is on the other side of a gear: --gear-ratio N and, for the "
-            "load's, --map CHANNEL=COLUMN:UNIT@load",
-        )
-
-
-def _explained(ratio: float, view: View) -> list[tuple[str, str, str]]:
+def explained(ratio: float, view: View) -> list[tuple[str, str, str]]:
     """Units that explain a ratio, fewest first: code, in words, remedy."""
     linear = view.record.units["position"] == "m"
     found: list[tuple[float, str, str, str]] = []
@@ -249,7 +193,7 @@ def _explained(ratio: float, view: View) -> list[tuple[str, str, str]]:
 def too_fast(view: View) -> Iterator[Finding]:
     """Speeds and torques that no axis has."""
     smooth = view.smooth
-    if smooth is None or not view.has("position") or (_in_counts(view) and not view.stated("position")):
+    if smooth is None or not view.has("position") or (in_counts(view) and not view.stated("position")):
         return
     angle = view.record.units["position"] == "rad"
     doubtful, absurd = (1000.0, 10000.0) if angle else (20.0, 1000.0)

@@ -1,0 +1,232 @@
+"""The velocity's own column against the change of the position: its unit, its sign, and by how much it is late.
+
+A column that is late or filtered differs from the position's change without a wrong unit, most of all where a short
+record has little more than the start of a motion. So both are compared away from the ends, where filters begin, and
+once more with the delay or the low-pass that explains the most.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from stickslip.finding import Finding
+from stickslip.identify.doctor.units import explained, in_counts
+from stickslip.identify.doctor.view import Array, View
+
+LATE, EXPLAINS = 1.0, 0.5
+"""Rows from which on a velocity is late: one that was differenced from row to row is half a row; and the share of its
+distance from the position's change that its lateness then explains."""
+LEAST = 1e-100
+"""Of speeds, over which, and under one over which, they are no numbers of an axis."""
+LOOKS = 6
+"""At the velocity, each shifted by what the one before found."""
+EDGE, FEWEST, STEPS, MOST = 20, 20, 20.0, 0.5
+"""Rows at either end in which the filter of 4 rows still knows that the record ends; rows between that tell at least;
+steps of the encoder, and the part of its way, that the position must move there."""
+SAME = 1.25
+"""Times by which a velocity may be off in size: torque ripple and coarse counts make as much."""
+ALIKE = 1.3
+"""Times that the sizes in both halves of the motion may be apart for one unit to explain them."""
+FOLLOWS = 0.6
+"""Correlation with the position's change above which a velocity follows it."""
+
+
+class Late(NamedTuple):
+    """By how much a velocity is late, s; its size, in that of the position's change; and the mean squares of what it
+    differs by then, and differed by before."""
+
+    time: float
+    size: float
+    left: float
+    before: float
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """The velocity's column and the position's change, filtered alike, away from the ends of the record.
+
+    Attributes
+    ----------
+    period : float
+        s
+    given, velocity, acceleration : array, shape (n,)
+        In SI units: the column, and the position's derivatives.
+    """
+
+    period: float
+    given: Array
+    velocity: Array
+    acceleration: Array
+
+    @property
+    def correlation(self) -> float:
+        """Of both."""
+        size = math.sqrt(float(np.mean(self.given**2) * np.mean(self.velocity**2)))
+        return float(np.mean(self.given * self.velocity)) / size
+
+    @property
+    def size(self) -> float:
+        """Root mean square of the column over that of the position's change."""
+        return math.sqrt(float(np.mean(self.given**2) / np.mean(self.velocity**2)))
+
+    @property
+    def alike(self) -> bool:
+        """Whether both halves of the motion have about the same size."""
+        work = np.cumsum(self.velocity**2)
+        half = int(np.searchsorted(work, 0.5 * work[-1]))
+        sizes = [
+            float(np.mean(self.given[part] ** 2)) / max(float(np.mean(self.velocity[part] ** 2)), 1e-300)
+            for part in (slice(None, half), slice(half, None))
+            if self.given[part].size
+        ]
+        return max(sizes) <= ALIKE**2 * min(sizes)
+
+    @property
+    def sizes(self) -> list[float]:
+        """Of the column in that of the position's change, beside the delay or the low-pass that explains the most, and
+        beside the other one where it explains as much; as they are where neither explains it."""
+        found = [
+            (late.left / max(float(np.mean(of**2)), 1e-300), late.size)
+            for late, of in ((lateness(self), self.given), (filtered(self), self.velocity))
+            if late.left <= EXPLAINS * late.before
+        ]
+        least = min((left for left, _ in found), default=0.0)
+        untouched = math.copysign(self.size, self.correlation)
+        return [size for left, size in sorted(found) if left <= least / EXPLAINS] or [untouched]
+
+
+def compared(view: View) -> Compared | None:
+    """Both velocities; None where there are not both, or the record is too short or too coarse to compare them."""
+    smooth = view.smooth
+    if smooth is None or not (view.has("position") and view.has("velocity")) or smooth.fast <= 0.0:
+        return None
+    inside = slice(EDGE, max(smooth.velocity.size - EDGE, EDGE))
+    given, velocity = view.given_velocity[inside], smooth.velocity[inside]
+    moved, in_all = (float(np.sum(np.abs(v))) * smooth.period for v in (velocity, smooth.velocity))
+    if given.size < FEWEST or moved < max(STEPS * view.step, MOST * in_all):
+        return None
+    sizes = [float(np.sqrt(np.mean(x**2))) for x in (given, velocity)]
+    if not all(LEAST < x < 1.0 / LEAST for x in sizes):
+        return None
+    return Compared(smooth.period, given, velocity, smooth.acceleration[inside])
+
+
+def lateness(both: Compared) -> Late:
+    """The delay that explains the most.
+
+    Least squares of given = c (v(t) - late dv/dt), about the time that the look before has found.
+    """
+    given, period = both.given, both.period
+    sizes = [float(np.sqrt(np.mean(x**2))) for x in (both.velocity, both.acceleration)]
+    if not all(LEAST < x < 1.0 / LEAST for x in sizes):
+        return Late(0.0, both.size, 0.0, 0.0)
+    times = period * np.arange(given.size)
+    late = left = before = size = 0.0
+    for look in range(LOOKS):
+        known = (times >= late) & (times <= times[-1] + late)
+        if np.count_nonzero(known) < FEWEST:
+            return Late(0.0, both.size, before, before)
+        v, a = (np.interp((times - late)[known], times, x) for x in (both.velocity, both.acceleration))
+        scaled = np.linalg.lstsq(np.stack([v, a]).T / sizes, given[known], rcond=None)[0]
+        size, change = (float(x) / each for x, each in zip(scaled, sizes, strict=True))
+        left = float(np.mean((given[known] - size * v) ** 2))
+        before = left if look == 0 else before
+        if size == 0.0 or look == LOOKS - 1:
+            break
+        late -= change / size
+    return Late(late, size, left, before)
+
+
+def filtered(both: Compared) -> Late:
+    """The low-pass of first order that explains the most, its time constant as the delay.
+
+    Least squares of v = (given + late d given/dt) / c; what is left is in units of the position's change.
+    """
+    change = np.gradient(both.given, both.period)
+    matrix = np.stack([both.given, change]).T
+    sizes = np.maximum(np.sqrt(np.mean(matrix**2, axis=0)), LEAST)
+    scaled = np.linalg.lstsq(matrix / sizes, both.velocity, rcond=None)[0] / sizes
+    one, late = (float(x) for x in scaled)
+    alone = float(np.mean(both.given * both.velocity) / np.mean(both.given**2))
+    left, before = (
+        float(np.mean((both.velocity - told) ** 2)) for told in (matrix @ scaled, alone * both.given)
+    )
+    if one == 0.0 or late / one < 0.0:
+        return Late(0.0, math.inf, before, before)
+    return Late(late / one, 1.0 / one, left, before)
+
+
+def velocity_late(view: View) -> Iterator[Finding]:
+    """A velocity that a filter delays, or that is of an older row than its position."""
+    both = compared(view)
+    if both is None:
+        return
+    late = lateness(both)
+    rows = late.time / view.period
+    if abs(rows) < LATE or late.left > EXPLAINS * late.before:
+        return
+    said = "lags" if rows > 0.0 else "leads"
+    why = (
+        "the drive filters it, or logs it cycles later"
+        if rows > 0.0
+        else "the position is logged cycles later"
+    )
+    yield Finding(
+        "note",
+        "velocity-late",
+        f"velocity {said} the derivative of position by {abs(late.time) * 1e3:.3g} ms ({abs(rows):.3g} rows): {why}",
+        remedy="an axis is identified by its position; --method breakaway takes the velocity, and derives it with "
+        "--map velocity=none",
+    )
+
+
+def velocity_scale(view: View) -> Iterator[Finding]:
+    """The velocity against the derivative of the position: another unit, another sign."""
+    both = compared(view)
+    if both is None or (in_counts(view) and not view.stated("position")):
+        return
+    follows = both.correlation
+    if turned := follows < -FOLLOWS:
+        remedy = (
+            f"say {view.mapped('velocity', '-')}, or say --map velocity=none to derive it from the position"
+        )
+        yield Finding(
+            "error", "velocity-sign", "velocity is positive where the position falls", remedy=remedy
+        )
+    if right(both.size) and abs(follows) > FOLLOWS:
+        return
+    sizes = [-x if turned else x for x in both.sizes]
+    if any(right(x) for x in sizes):
+        return
+    if abs(follows) < FOLLOWS:
+        message = f"velocity does not follow the position (correlation {follows:.2f})"
+        remedy = "check that both belong to one axis; --map velocity=none derives it from the position"
+        yield Finding("warning", "velocity-mismatch", message, remedy=remedy)
+    elif both.alike:
+        yield _another_unit(abs(sizes[0]), view)
+
+
+def right(size: float) -> bool:
+    """Whether a velocity of this size, in that of the position's change, is in the same unit."""
+    return 1.0 / SAME < size < SAME
+
+
+def _another_unit(size: float, view: View) -> Finding:
+    """Of a velocity of another size than the position's change: which units explain it."""
+    message = (
+        f"velocity is {size:.4g} times the change of position per second, where both are taken in SI"
+        f" ({view.record.units['velocity']})"
+    )
+    if guesses := explained(size, view):
+        words = " or ".join(g[1] for g in guesses[:2])
+        return Finding("error", guesses[0][0], f"{message}: {words}", remedy=f"say {guesses[0][2]}")
+    remedy = (
+        "check both units, and whether one is on the other side of a gear: --gear-ratio N and, for the load's, --map "
+        "CHANNEL=COLUMN:UNIT@load"
+    )
+    return Finding("error", "velocity-mismatch", message, remedy=remedy)
