@@ -30,10 +30,12 @@ EDGE, FEWEST, STEPS, MOST = 20, 20, 20.0, 0.5
 steps of the encoder, and the part of its way, that the position must move there."""
 SAME = 1.25
 """Times by which a velocity may be off in size: torque ripple and coarse counts make as much."""
+BY_CHANCE = 2.0
+"""Standard deviations of a velocity's size, of so many counts, within which it may be right."""
 ALIKE = 1.3
 """Times that the sizes in both halves of the motion may be apart for one unit to explain them."""
-FOLLOWS = 0.6
-"""Correlation with the position's change above which a velocity follows it."""
+FOLLOWS, LONG = 0.6, 500
+"""Correlation with the position's change above which a velocity follows it; and rows that tell that it does not."""
 
 
 class Late(NamedTuple):
@@ -46,6 +48,24 @@ class Late(NamedTuple):
     before: float
 
 
+class Size(NamedTuple):
+    """Size of the column in that of the position's change: noise in the latter takes from `least`, noise in the column
+    adds to `most`."""
+
+    least: float
+    most: float
+
+    @property
+    def middle(self) -> float:
+        """Geometric mean of both."""
+        return math.sqrt(abs(self.least * self.most))
+
+    @property
+    def right(self) -> bool:
+        """Whether both may be in the same unit."""
+        return self.least < SAME and self.most > 1.0 / SAME
+
+
 @dataclass(frozen=True, eq=False)
 class Compared:
     """The velocity's column and the position's change, filtered alike, away from the ends of the record.
@@ -56,12 +76,16 @@ class Compared:
         s
     given, velocity, acceleration : array, shape (n,)
         In SI units: the column, and the position's derivatives.
+    counts : float
+        Of the encoder of which the column was made at most, where it is their differences: each was there by chance, in
+        a row that was logged.
     """
 
     period: float
     given: Array
     velocity: Array
     acceleration: Array
+    counts: float = math.inf
 
     @property
     def correlation(self) -> float:
@@ -87,17 +111,28 @@ class Compared:
         return max(sizes) <= ALIKE**2 * min(sizes)
 
     @property
-    def sizes(self) -> list[float]:
+    def sizes(self) -> list[Size]:
         """Of the column in that of the position's change, beside the delay or the low-pass that explains the most, and
         beside the other one where it explains as much; as they are where neither explains it."""
+        late, slow = lateness(self), filtered(self)
+        told = (
+            1.0 - late.left / float(np.mean(self.given**2)),
+            1.0 - slow.left / float(np.mean(self.velocity**2)),
+        )
         found = [
-            (late.left / max(float(np.mean(of**2)), 1e-300), late.size)
-            for late, of in ((lateness(self), self.given), (filtered(self), self.velocity))
-            if late.left <= EXPLAINS * late.before
+            (1.0 - part, size)
+            for fit, part, size in (
+                (late, told[0], Size(late.size, late.size / max(told[0], LEAST))),
+                (slow, told[1], Size(slow.size * told[1], slow.size)),
+            )
+            if fit.left <= EXPLAINS * fit.before
         ]
-        least = min((left for left, _ in found), default=0.0)
-        untouched = math.copysign(self.size, self.correlation)
-        return [size for left, size in sorted(found) if left <= least / EXPLAINS] or [untouched]
+        smallest = min((left for left, _ in found), default=0.0)
+        follows = self.correlation
+        untouched = Size(self.size * follows, self.size / (follows if abs(follows) > LEAST else LEAST))
+        chance = 1.0 + BY_CHANCE / math.sqrt(self.counts)
+        sizes = [size for left, size in sorted(found) if left <= smallest / EXPLAINS] or [untouched]
+        return [Size(x.least / chance, x.most * chance) for x in sizes]
 
 
 def compared(view: View) -> Compared | None:
@@ -108,12 +143,21 @@ def compared(view: View) -> Compared | None:
     inside = slice(EDGE, max(smooth.velocity.size - EDGE, EDGE))
     given, velocity = view.given_velocity[inside], smooth.velocity[inside]
     moved, in_all = (float(np.sum(np.abs(v))) * smooth.period for v in (velocity, smooth.velocity))
-    if given.size < FEWEST or moved < max(STEPS * view.step, MOST * in_all):
+    step = view.step or least(np.diff(view.values("position")))
+    if given.size < FEWEST or moved < max(STEPS * step, MOST * in_all):
         return None
     sizes = [float(np.sqrt(np.mean(x**2))) for x in (given, velocity)]
     if not all(LEAST < x < 1.0 / LEAST for x in sizes):
         return None
-    return Compared(smooth.period, given, velocity, smooth.acceleration[inside])
+    logged = view.values("velocity")[EDGE:-EDGE]
+    counts = float(np.sum(np.abs(logged))) / max(least(logged), LEAST)
+    return Compared(smooth.period, given, velocity, smooth.acceleration[inside], counts)
+
+
+def least(values: Array) -> float:
+    """The smallest size of any that is not 0; 0 where all are."""
+    sizes = np.abs(values[values != 0.0])
+    return float(np.min(sizes)) if sizes.size else 0.0
 
 
 def lateness(both: Compared) -> Late:
@@ -150,7 +194,7 @@ def filtered(both: Compared) -> Late:
     change = np.gradient(both.given, both.period)
     matrix = np.stack([both.given, change]).T
     sizes = np.maximum(np.sqrt(np.mean(matrix**2, axis=0)), LEAST)
-    scaled = np.linalg.lstsq(matrix / sizes, both.velocity, rcond=None)[0] / sizes
+    scaled: Array = np.linalg.lstsq(matrix / sizes, both.velocity, rcond=None)[0] / sizes
     one, late = (float(x) for x in scaled)
     alone = float(np.mean(both.given * both.velocity) / np.mean(both.given**2))
     left, before = (
@@ -198,22 +242,19 @@ def velocity_scale(view: View) -> Iterator[Finding]:
         yield Finding(
             "error", "velocity-sign", "velocity is positive where the position falls", remedy=remedy
         )
-    if right(both.size) and abs(follows) > FOLLOWS:
+    if Size(both.size, both.size).right and abs(follows) > FOLLOWS:
         return
-    sizes = [-x if turned else x for x in both.sizes]
-    if any(right(x) for x in sizes):
+    sizes = [Size(-x.least, -x.most) if turned else x for x in both.sizes]
+    if any(x.right for x in sizes if abs(follows) > FOLLOWS or x.least > FOLLOWS * x.most):
         return
     if abs(follows) < FOLLOWS:
+        if both.given.size < LONG:
+            return
         message = f"velocity does not follow the position (correlation {follows:.2f})"
         remedy = "check that both belong to one axis; --map velocity=none derives it from the position"
         yield Finding("warning", "velocity-mismatch", message, remedy=remedy)
     elif both.alike:
-        yield _another_unit(abs(sizes[0]), view)
-
-
-def right(size: float) -> bool:
-    """Whether a velocity of this size, in that of the position's change, is in the same unit."""
-    return 1.0 / SAME < size < SAME
+        yield _another_unit(abs(sizes[0].middle), view)
 
 
 def _another_unit(size: float, view: View) -> Finding:
