@@ -43,6 +43,22 @@ def test_degrees_may_be_a_gear_too():
     assert "if it is in degrees, or identify with --gear-ratio 5" in found.remedy
 
 
+@pytest.mark.parametrize(("swing", "weighs"), [(0.27, True), (1.0, True), (0.27, False)])
+def test_a_bend_over_a_twelfth_of_a_turn_is_no_gravity(swing, weighs):
+    """Cogging of 0.12 N·m over 30 degrees was "7.01 N·m once a turn, as gravity does"; a pendulum shows a fifth of its
+    weight there."""
+    found = swinging(math.tau, swing)
+    if not weighs:
+        q = found["position"]
+        v = np.gradient(q, found.time)
+        bent = found["motor_torque"] - 0.4 * np.sin(q) + 0.3 * np.sign(v) + 0.12 * np.cos(8.0 * q)
+        found = Record(found.time, {**{c: found[c] for c in found.channels}, "motor_torque": bent}, UNITS)
+    said = [f.message for f in examine(found).findings if f.code == "gravity"]
+    assert len(said) == int(weighs)
+    if said:
+        assert float(said[0].split("angle: ")[1].split()[0]) == pytest.approx(0.4, rel=0.1)
+
+
 def moved(weight: float, *, magnitude: bool) -> Record:
     t = np.arange(0.0, 4.0, 1e-3)
     q = 8.0 * np.sin(2.0 * np.pi * 0.5 * t)

@@ -357,10 +357,11 @@ def first_look(
     notes: list[str] = []
     if per_direction:
         each = inverse_dynamics(experiments, axis, per_direction=True, harmonics=extras.harmonics)
+        # Its levels, of all rows that move, are others than those of certain sliding: one number for one thing.
         notes.append(
-            f"Per direction: Fc {each['fc_plus']:.4g} and {each['fc_minus']:.4g}, Fv {each['fv_plus']:.4g} and "
-            f"{each['fv_minus']:.4g}; relative error {100 * each.relative_error:.2f} % instead of "
-            f"{100 * found.relative_error:.2f} %."
+            f"Plain least squares over the whole record leave {100 * each.relative_error:.2f} % of the torque with "
+            f"friction per direction, {100 * found.relative_error:.2f} % with one friction for both and a constant "
+            "torque."
         )
         notes.append("A torque offset cannot be distinguished from friction that differs by direction.")
     return found, notes

@@ -28,6 +28,9 @@ QUARTER = 90.0
 IN_DEGREES, CLOSER, APART = 360.0 / math.tau, 0.5, 1.1
 """Turns of 2 pi in 360; part of what these leave of the torque below which another number of turns explains it; and by
 how much that is another one."""
+EXTRAPOLATED = 5.0
+"""Times what the record shows of it that a torque over the turn may be: a pendulum that swings by 12 degrees to either
+side shows a fifth."""
 BOTH = 0.05
 """Share of the moving rows in either direction below which friction is not told from a constant torque."""
 STRETCHES, SURE = 12, 3.0
@@ -236,14 +239,18 @@ def gravity(view: View) -> Iterator[Finding]:
 
 
 def _once_a_turn(smooth: Smooth, plain: Fit, turns: float) -> tuple[float, float]:
-    """Amplitude of a torque that comes back after so many turns of the position, 0 where it does not; and what that
-    leaves."""
+    """Amplitude of a torque that comes back after so many turns of the position, 0 where it does not or where the
+    record shows little of it; and what that leaves."""
     size = float(np.std(smooth.torque))
     if not np.ptp(smooth.position) > 0.5 * turns or size == 0.0:
         return 0.0, plain.rest
     full = _fit(smooth, 0, periodic=True, turn=turns * math.tau)
     amplitude = math.hypot(full.values[4], full.values[5])
+    angle = smooth.position[_rows(smooth)] / turns
+    # Of a short part of a turn any bend of the torque makes a wave, with the constant torque against it.
+    seen = 0.5 * float(np.ptp(full.values[4] * np.sin(angle) + full.values[5] * np.cos(angle)))
     shows = full.rest < 0.7 * plain.rest and 0.1 * size < amplitude < 20.0 * size and full.explained > 0.5
+    shows = shows and seen > max(0.1 * size, amplitude / EXTRAPOLATED)
     return (amplitude if shows else 0.0), full.rest
 
 

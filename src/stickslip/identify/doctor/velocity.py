@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -101,7 +101,7 @@ class Compared:
     @property
     def alike(self) -> bool:
         """Whether both halves of the motion have about the same size."""
-        work = np.cumsum(self.velocity**2)
+        work: Array = np.cumsum(self.velocity**2)
         half = int(np.searchsorted(work, 0.5 * work[-1]))
         sizes = [
             float(np.mean(self.given[part] ** 2)) / max(float(np.mean(self.velocity[part] ** 2)), 1e-300)
@@ -194,12 +194,12 @@ def filtered(both: Compared) -> Late:
     change = np.gradient(both.given, both.period)
     matrix = np.stack([both.given, change]).T
     sizes = np.maximum(np.sqrt(np.mean(matrix**2, axis=0)), LEAST)
-    scaled: Array = np.linalg.lstsq(matrix / sizes, both.velocity, rcond=None)[0] / sizes
-    one, late = (float(x) for x in scaled)
+    solved = cast("tuple[Array, ...]", np.linalg.lstsq(matrix / sizes, both.velocity, rcond=None))[0]
+    scaled: Array = solved / sizes
+    one, late = float(scaled[0]), float(scaled[1])
     alone = float(np.mean(both.given * both.velocity) / np.mean(both.given**2))
-    left, before = (
-        float(np.mean((both.velocity - told) ** 2)) for told in (matrix @ scaled, alone * both.given)
-    )
+    left = float(np.mean((both.velocity - one * both.given - late * change) ** 2))
+    before = float(np.mean((both.velocity - alone * both.given) ** 2))
     if one == 0.0 or late / one < 0.0:
         return Late(0.0, math.inf, before, before)
     return Late(late / one, 1.0 / one, left, before)
