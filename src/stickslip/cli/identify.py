@@ -144,7 +144,8 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
     )  # fmt: skip
     parser.add_argument(
         "--delay", type=float, metavar="S",
-        help="delay until the torque acts (current loop, dead time), s; 0 if only --torque-is is given",
+        help="delay until the torque acts (current loop, dead time), s; 0 if only --torque-is is given, which is "
+        "commanded if only this is",
     )  # fmt: skip
     parser.add_argument(
         "--harmonics",

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.axis.falling import missing_fall
+from stickslip.identify.axis.given_timing import CONTRADICTED
 from stickslip.identify.axis.in_sentences import on_timing
 from stickslip.identify.axis.loop_check import OTHER_LOOP
 from stickslip.identify.axis.problem import mechanics_parameters
@@ -237,6 +238,8 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
         out.append(f"on records held out its force error is {percent(held)}, {percent(own)} on those fitted")
     if any(OTHER_LOOP in note for note in found.notes):
         out.append("the record shows another controller than the loop given")
+    if any(note.startswith(CONTRADICTED) for note in found.notes):
+        out.append(f"{CONTRADICTED[0].lower()}{CONTRADICTED[1:]}")
     warned = [f for f in found.findings if getattr(f, "level", "") == "warning"]
     regression = found.details.get("regression")
     if isinstance(regression, Regression) and not any(f.code == "change" for f in warned):

@@ -360,8 +360,7 @@ def first_look(
         # Its levels, of all rows that move, are others than those of certain sliding: one number for one thing.
         notes.append(
             f"Plain least squares over the whole record leave {100 * each.relative_error:.2f} % of the torque with "
-            f"friction per direction, {100 * found.relative_error:.2f} % with one friction for both and a constant "
-            "torque."
+            f"friction per direction, {100 * found.relative_error:.2f} % with one friction for both."
         )
         notes.append("A torque offset cannot be distinguished from friction that differs by direction.")
     return found, notes

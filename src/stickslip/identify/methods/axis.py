@@ -8,6 +8,7 @@ from dataclasses import replace
 from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis.agreed import regressed
+from stickslip.identify.axis.given_timing import against_record
 from stickslip.identify.axis.identify import AUTOMATIC, identify_axis
 from stickslip.identify.axis.over_angle import over_angle
 from stickslip.identify.axis.plain import inverse_identification
@@ -22,6 +23,10 @@ from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 
+TAKEN = (
+    "With --delay alone the torque column counts as commanded from its row to the next (--torque-is commanded); say "
+    "what it is if it is another."
+)
 BEHIND = {"commanded": -0.5, "actual": 0.0, "mean": 0.5}
 """Rows by which a column lies behind the torque: a command acts half a row after its row, on average, and a mean over
 the row before acted half a row before it."""
@@ -52,7 +57,19 @@ def with_map(
 def identified(
     axis: ServoAxis, experiments: Sequence[Experiment], count: int, skew: float | None, options: Options
 ) -> Identification:
-    """The axis from the first so many experiments, judged by the rest."""
+    """The axis from the first so many experiments, judged by the rest; and what is to be said of a given timing."""
+    found = by_law(axis, experiments, count, skew, options)
+    if skew is None:
+        return found
+    said = against_record(experiments[:count], axis, skew, options.regress)
+    taken = [TAKEN] if options.torque_is is None else []
+    return replace(found, notes=(*taken, *said, *found.notes))
+
+
+def by_law(
+    axis: ServoAxis, experiments: Sequence[Experiment], count: int, skew: float | None, options: Options
+) -> Identification:
+    """The axis by its laws, or by least squares alone."""
     fitted, held = experiments[:count], experiments[count:]
     refuse_for_every_law(axis, fitted, options)
     if options.inverse:
