@@ -102,7 +102,7 @@ class Compared:
     def alike(self) -> bool:
         """Whether both halves of the motion have about the same size."""
         work: Array = np.cumsum(self.velocity**2)
-        half = int(np.searchsorted(work, 0.5 * work[-1]))
+        half = int(np.count_nonzero(work < 0.5 * float(work[-1])))
         sizes = [
             float(np.mean(self.given[part] ** 2)) / max(float(np.mean(self.velocity[part] ** 2)), 1e-300)
             for part in (slice(None, half), slice(half, None))
