@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.identify.axis.in_sentences import on_creep
+from stickslip.identify.experiment import Experiment
+from stickslip.identify.regression.creeping import NOWHERE
+from stickslip.identify.regression.number import Number
+from stickslip.identify.regression.regression import regress_axis
+from stickslip.machines.servo import ServoAxis
 
+AXIS = ServoAxis(drive_side="load")
 RATE, INERTIA = 1000.0, 1.35e-3
 SPEEDS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 80.0, 150.0)
 
@@ -44,3 +52,26 @@ def test_a_grease_that_thins_has_no_level_and_slope(root: float) -> None:
         assert fc.value == pytest.approx(0.35, rel=0.01)
     else:
         assert "slower steady motion" in fc.verdict
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_friction_is_not_missing_where_a_chattering_torque_makes_speeds_lack_and_exceed_it_by_turns(
+    seed: int,
+) -> None:
+    """Another program's axis of plain friction whose loop chatters: "68% of friction's level is missing although the
+    axis slides steadily"."""
+    log = staircase(0.0)
+    white = np.random.default_rng(seed).standard_normal(log["t"].size + 199)
+    chatter = 0.35 * np.convolve(white, np.ones(200) / np.sqrt(200.0), "valid")
+    found = regress_axis([Experiment("log", log["t"], log["position"], log["torque"] + chatter)], AXIS)
+    assert found.creep == NOWHERE
+
+
+def test_of_a_record_whose_numbers_are_not_believed_no_friction_is_missing() -> None:
+    log = staircase(0.05)
+    found = regress_axis([Experiment("log", log["t"], log["position"], log["torque"])], AXIS)
+    (said,) = on_creep(found, AXIS)
+    assert "is missing although the axis slides steadily" in said
+    unsure = {**found.numbers, "inertia": Number(INERTIA, 10.0 * INERTIA)}
+    assert replace(found, numbers=unsure).doubt
+    assert on_creep(replace(found, numbers=unsure), AXIS) == []

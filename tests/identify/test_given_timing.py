@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,7 +39,7 @@ def arrays() -> dict[str, np.ndarray]:
 )
 @pytest.mark.parametrize("inverse", [False, True])
 def test_a_timing_that_the_record_contradicts_is_told(
-    arrays: dict[str, np.ndarray], given: dict[str, object], contradicted: bool, inverse: bool
+    arrays: dict[str, np.ndarray], given: Any, contradicted: bool, inverse: bool
 ) -> None:
     """ "Yes: every number is identified", and the model 9 % off where the axis slides, for 4 with the record's own."""
     found = ss.identify(**arrays, law=None if inverse else "coulomb", inverse=inverse, **given)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.identify.fit.smooth import root_mean_square
 from stickslip.identify.regression.band_system import least_squares
 from stickslip.identify.regression.sliding_rows import DIRECTION, FEWEST, SlidingRows
 from stickslip.identify.regression.strokes import stacked
@@ -78,17 +79,20 @@ def creep_of(records: Sequence[SlidingRows], skew: float) -> Creep:
 
 def steady_lack(first: Sequence[SlidingRows], kept: Sequence[SlidingRows], skew: float, far: float) -> Creep:
     """What friction lacks, beside the level and slope of the `kept` rows, in slower ones that were left out although
-    the axis had gone `far` since it turned, rad (m): at the speeds where most of it does."""
+    the axis had gone `far` since it turned, rad (m): at the speeds where most of it does. Nothing where the kept rows
+    leave as much themselves, as a loop that chatters makes them: speeds then lack and exceed it by turns."""
     fixed, speed, gone = (stacked(first, name) for name in ("fixed", "speed", "gone"))
     slowest = float(np.min(np.abs(stacked(kept, "speed"))))
     slower = (gone > far) & (np.abs(speed) < slowest)
     fewest = max(FEWEST, SHARE * speed.size)
     if np.count_nonzero(slower) < fewest:
         return NOWHERE
-    values = least_squares(stacked(kept, "fixed"), np.concatenate([r.torque(skew) for r in kept]))
+    own, acted = stacked(kept, "fixed"), np.concatenate([r.torque(skew) for r in kept])
+    values = least_squares(own, acted)
     level = float(values[DIRECTION])
     if level <= 0.0:
         return NOWHERE
+    left = root_mean_square(acted - own @ values) / level
     torque = np.concatenate([r.torque(skew) for r in first])
     missing = -(torque - fixed @ values) * fixed[:, DIRECTION] / level
     octave = np.floor(np.log2(slowest / np.maximum(np.abs(speed), 1e-9 * slowest)))
@@ -98,4 +102,4 @@ def steady_lack(first: Sequence[SlidingRows], kept: Sequence[SlidingRows], skew:
         if np.count_nonzero(inside := slower & (octave == k)) >= fewest
     ]
     most = max(lacks, default=0.0)
-    return Creep(slowest, most, steady=True) if most > MISSING else NOWHERE
+    return Creep(slowest, most, steady=True) if most > max(MISSING, left) else NOWHERE

@@ -74,20 +74,29 @@ STILL = Swing(0.0, 0.0, 0.0)
 
 
 def two_inertias(swings: Sequence[Swing]) -> TwoInertias | None:
-    """Motor and load as the two widest bands say together, their intervals as wide as these differ; None where they do
-    not tell."""
+    """Motor and load as the two widest bands say together, their intervals as wide as these and any narrower band that
+    shows motor and load differ; None where they do not tell."""
     if len(swings) < 2:
         return None
-    first, second = swings[:2]
+    first, second, *narrower = swings
+    seen = (first, second, *(s for s in narrower if 0.0 < s.motor_share < 1.0))
     frequency, share = (
         0.5 * (first.antiresonance + second.antiresonance),
         0.5 * (first.motor_share + second.motor_share),
     )
-    half = max(abs(first.antiresonance - second.antiresonance), SURE_FREQUENCY * frequency)
-    most = max(abs(first.motor_share - second.motor_share), SURE_SHARE)
+    frequencies, shares = [s.antiresonance for s in seen], [s.motor_share for s in seen]
+    half = max(max(frequencies) - min(frequencies), SURE_FREQUENCY * frequency)
+    most = max(max(shares) - min(shares), SURE_SHARE)
     if not (half <= TOLD_FREQUENCY * frequency and most <= TOLD_SHARE and most < share < MOST_SHARE - most):
         return None
     return TwoInertias(frequency, (frequency - half, frequency + half), share, (share - most, share + most))
+
+
+def moves_a_load(swings: Sequence[Swing]) -> bool:
+    """Whether what the two widest bands say of a swing leaves the motor less than `MOST_SHARE` of the inertia: with
+    more, what bends the torque is no load."""
+    shares = [s.motor_share for s in swings[:2] if s.torque < 0.0]
+    return bool(shares) and 0.0 < sum(shares) / len(shares) < MOST_SHARE
 
 
 def flexible_columns(records: Sequence[SlidingRows], inertia: float, train: Train) -> tuple[Array, Array]:
