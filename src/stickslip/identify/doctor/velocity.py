@@ -38,16 +38,6 @@ FOLLOWS, LONG = 0.6, 500
 """Correlation with the position's change above which a velocity follows it; and rows that tell that it does not."""
 
 
-class Late(NamedTuple):
-    """By how much a velocity is late, s; its size, in that of the position's change; and the mean squares of what it
-    differs by then, and differed by before."""
-
-    time: float
-    size: float
-    left: float
-    before: float
-
-
 class Size(NamedTuple):
     """Size of the column in that of the position's change: noise in the latter takes from `least`, noise in the column
     adds to `most`."""
@@ -64,6 +54,16 @@ class Size(NamedTuple):
     def right(self) -> bool:
         """Whether both may be in the same unit."""
         return self.least < SAME and self.most > 1.0 / SAME
+
+
+class Late(NamedTuple):
+    """By how much a velocity is late, s; its size beside that; the part of it that is left; and whether that is less by
+    `EXPLAINS` than what is left as it is."""
+
+    time: float
+    size: Size
+    left: float
+    explains: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,25 +114,17 @@ class Compared:
     def sizes(self) -> list[Size]:
         """Of the column in that of the position's change, beside the delay or the low-pass that explains the most, and
         beside the other one where it explains as much; as they are where neither explains it."""
-        late, slow = lateness(self), filtered(self)
-        told = (
-            1.0 - late.left / float(np.mean(self.given**2)),
-            1.0 - slow.left / float(np.mean(self.velocity**2)),
-        )
-        found = [
-            (1.0 - part, size)
-            for fit, part, size in (
-                (late, told[0], Size(late.size, late.size / max(told[0], LEAST))),
-                (slow, told[1], Size(slow.size * told[1], slow.size)),
-            )
-            if fit.left <= EXPLAINS * fit.before
-        ]
-        smallest = min((left for left, _ in found), default=0.0)
-        follows = self.correlation
-        untouched = Size(self.size * follows, self.size / (follows if abs(follows) > LEAST else LEAST))
-        chance = 1.0 + BY_CHANCE / math.sqrt(self.counts)
-        sizes = [size for left, size in sorted(found) if left <= smallest / EXPLAINS] or [untouched]
-        return [Size(x.least / chance, x.most * chance) for x in sizes]
+        found = [late for late in (lateness(self), filtered(self)) if late.explains]
+        smallest = min((late.left for late in found), default=0.0)
+        told = [late.size for late in found if late.left <= smallest / EXPLAINS]
+        chance = 1.0 + BY_CHANCE / math.sqrt(max(self.counts, 1.0))
+        return [Size(x.least / chance, x.most * chance) for x in told or [self.as_they_are]]
+
+    @property
+    def as_they_are(self) -> Size:
+        """Of the column in that of the position's change, beside nothing."""
+        follows = self.correlation if abs(self.correlation) > LEAST else LEAST
+        return Size(self.size * follows, self.size / follows)
 
 
 def compared(view: View) -> Compared | None:
@@ -168,13 +160,13 @@ def lateness(both: Compared) -> Late:
     given, period = both.given, both.period
     sizes = [float(np.sqrt(np.mean(x**2))) for x in (both.velocity, both.acceleration)]
     if not all(LEAST < x < 1.0 / LEAST for x in sizes):
-        return Late(0.0, both.size, 0.0, 0.0)
+        return Late(0.0, both.as_they_are, 1.0, False)
     times = period * np.arange(given.size)
     late = left = before = size = 0.0
     for look in range(LOOKS):
         known = (times >= late) & (times <= times[-1] + late)
         if np.count_nonzero(known) < FEWEST:
-            return Late(0.0, both.size, before, before)
+            return Late(0.0, both.as_they_are, 1.0, False)
         v, a = (np.interp((times - late)[known], times, x) for x in (both.velocity, both.acceleration))
         scaled = np.linalg.lstsq(np.stack([v, a]).T / sizes, given[known], rcond=None)[0]
         size, change = (float(x) / each for x, each in zip(scaled, sizes, strict=True))
@@ -183,13 +175,14 @@ def lateness(both: Compared) -> Late:
         if size == 0.0 or look == LOOKS - 1:
             break
         late -= change / size
-    return Late(late, size, left, before)
+    part = left / float(np.mean(given**2))
+    return Late(late, Size(size, size / max(1.0 - part, LEAST)), part, left <= EXPLAINS * before)
 
 
 def filtered(both: Compared) -> Late:
     """The low-pass of first order that explains the most, its time constant as the delay.
 
-    Least squares of v = (given + late d given/dt) / c; what is left is in units of the position's change.
+    Least squares of v = (given + late d given/dt) / c.
     """
     change = np.gradient(both.given, both.period)
     matrix = np.stack([both.given, change]).T
@@ -201,8 +194,9 @@ def filtered(both: Compared) -> Late:
     left = float(np.mean((both.velocity - one * both.given - late * change) ** 2))
     before = float(np.mean((both.velocity - alone * both.given) ** 2))
     if one == 0.0 or late / one < 0.0:
-        return Late(0.0, math.inf, before, before)
-    return Late(late / one, 1.0 / one, left, before)
+        return Late(0.0, both.as_they_are, 1.0, False)
+    part = left / float(np.mean(both.velocity**2))
+    return Late(late / one, Size((1.0 - part) / one, 1.0 / one), part, left <= EXPLAINS * before)
 
 
 def velocity_late(view: View) -> Iterator[Finding]:
@@ -212,7 +206,7 @@ def velocity_late(view: View) -> Iterator[Finding]:
         return
     late = lateness(both)
     rows = late.time / view.period
-    if abs(rows) < LATE or late.left > EXPLAINS * late.before:
+    if abs(rows) < LATE or not late.explains:
         return
     said = "lags" if rows > 0.0 else "leads"
     why = (
