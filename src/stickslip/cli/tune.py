@@ -43,11 +43,14 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.cli import _output
     from stickslip.study.files import claim_folder
     from stickslip.study.study import interrupts_between_runs
+    from stickslip.sweep.checked_numbers import unvaried_lines
     from stickslip.verbs.tune import tune, tuning_of, written
 
     sweep = tuning_of(args.tune)
     if sweep.left_out:
         _output.warn(f"not varied, as the model's law has no such parameters: {', '.join(sweep.left_out)}")
+    for line in unvaried_lines(sweep):
+        _output.warn(line)
     out: Path = claim_folder(args.out or Path(f"tune-{sweep.name}"), sweep.name, "tune")
     found: list[dict[str, Any]] = []
     for planned in sweep.runs:

@@ -50,7 +50,8 @@ def draw(folder: Path, sweep: Sweep) -> list[Path]:
             made += [p for p in [_gains(target / f"gain-{stem}", folder, sweep, runs)] if p]
         elif sweep.drawn.nested:
             made += [p for p in [_uncertainty(target / f"uncertainty-{stem}", folder, sweep, runs)] if p]
-        made += [_tornado(target / f"tornado-{stem}-{run.controller}", folder, sweep, run) for run in runs]
+        changed = [run for run in runs if sweep.varied(run)]
+        made += [_tornado(target / f"tornado-{stem}-{run.controller}", folder, sweep, run) for run in changed]
     return made
 
 
@@ -177,11 +178,11 @@ def _percentiles(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun])
 def _tornado(stem: Path, folder: Path, sweep: Sweep, run: PlannedRun) -> Path:
     what, unit = metric_named(sweep.metrics[0])
     drawn, values = _columns(folder, sweep, run)
-    names = [n for n in sweep.drawn.names if n != LEVEL]
-    columns = [c for n, c in zip(sweep.drawn.names, drawn) if n != LEVEL]
+    names = sweep.varied(run)
+    columns = [drawn[i] for i in sorted(sweep.places(run).values())]
     if sweep.drawn.nested:
         # Within the range that its case drew; else its ends would stand for much uncertainty in all of the others.
-        middles = [0.5 * (s.low + s.high) for s in sweep.drawn.spreads]
+        middles = [0.5 * (s.low + s.high) for s in sweep.drawn.spreads if s.name in names]
         columns = [(c - m) / drawn[-1] for c, m in zip(columns, middles)]
     pairs = influences(columns, values)
     known = values[np.isfinite(values)]

@@ -6,7 +6,7 @@ import re
 
 from stickslip.spec import Field
 from stickslip.study.planned_run import PlannedRun
-from stickslip.sweep.numbers import parts
+from stickslip.sweep.numbers import INERTIA, parts
 
 METRICS = {
     "position_rms": "RMS position error", "position_peak": "peak position error",
@@ -50,7 +50,7 @@ def number_named(run: PlannedRun, name: str) -> tuple[str, str]:
     """
     family, rest, element = parts(name)
     place = "" if element is None else f", element {element + 1}"
-    if name == "axis.inertia":
+    if name in INERTIA:
         return "$J$", "kg·m²"
     if family == "controller" and rest in CONTROLLER:
         return CONTROLLER[rest]

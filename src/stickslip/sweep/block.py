@@ -32,7 +32,7 @@ class Block:
     run, start : int
         Place of the run in the sweep; first case.
     numbers : array, shape (n, names)
-        What was drawn.
+        What was drawn; NaN where the run has no such number.
     metrics : array, shape (n, metrics)
         NaN where there is none.
     flagged : array of bool, shape (n,)
@@ -74,7 +74,9 @@ def compute_cases(sweep: Sweep, run: int, start: int, numbers: Array) -> Block:
         found = measured(planned, values, sweep.metrics, len(numbers))
         if sweep.check:
             found, flagged = checked(planned, values, sweep.metrics, found)
-    return Block(run, start, numbers, found.metrics, flagged, found.failures, found.integrators)
+    return Block(
+        run, start, sweep.listed(planned, numbers), found.metrics, flagged, found.failures, found.integrators
+    )
 
 
 def doubtful(many: simd_batch.Lanes, sweep: Sweep, found: Measured) -> Flags:

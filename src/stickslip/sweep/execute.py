@@ -26,6 +26,7 @@ from stickslip.study.files import claim_folder, save_manifest
 from stickslip.study.study import interrupts_between_runs
 from stickslip.sweep import dataset
 from stickslip.sweep.block import Block, compute, integrator_of
+from stickslip.sweep.checked_numbers import unvaried_lines
 from stickslip.sweep.forecast import size_timed
 from stickslip.sweep.plan import BLOCK, Sweep
 
@@ -71,8 +72,8 @@ def run(
     progress : callable, optional
         ``progress(finished, all)`` in closed loops, first of what was found.
     say : callable, optional
-        ``say(line)`` is told before anything runs which runs the first integrator cannot run, and why, and how many
-        blocks were found.
+        ``say(line)`` is told before anything runs which runs the first integrator cannot run, and why, which do not
+        have a number that varies, and how many blocks were found.
 
     Returns
     -------
@@ -92,7 +93,7 @@ def run(
     ready(sweep, scheduler)
     folder, sweep = _prepared(Path(out), sweep)
     integrators = [integrator_of(sweep, i) for i in range(len(sweep.runs))]
-    for line in departures(sweep, integrators):
+    for line in [*departures(sweep, integrators), *unvaried_lines(sweep)]:
         say(line)
     clock, cpu = time.perf_counter(), time.process_time()
     missing = [b for b in sweep.blocks if not dataset.has_block(folder, sweep, *b)]
@@ -363,6 +364,7 @@ def write_manifest(
                 "fingerprint": sweep.fingerprint(i),
                 "integrator": name,
                 "sample_time_s": p.control.sample_time,
+                "varied": sweep.varied(p),
                 **({"because": why} if why else {}),
             }
             for i, (p, (name, why)) in enumerate(zip(sweep.runs, integrators))

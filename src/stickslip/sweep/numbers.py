@@ -3,8 +3,9 @@
 ``axis.inertia``, ``friction.NAME``, ``law.NAME`` (of the compensator's law), ``reference.NAME`` and, of the controller,
 ``controller.gain``, ``filter_hz``, ``bandwidth_hz``, ``damping``, ``kp``, ``ki``, ``kd``, ``kr``, ``torque_limit``,
 ``sample_time``; of one made of control laws its numbers by whole names (``controller.observer_corner``). An element of
-a list is ``friction.k[0]``. The machine varies under the controller as it was designed:
-gains follow ``bandwidth_hz`` and ``damping``, not the inertia.
+a list is ``friction.k[0]``. ``axis.inertia`` and ``machine.inertia`` both name the inertia of whatever axis the run
+has. The machine varies under the controller as it was designed: gains follow ``bandwidth_hz`` and ``damping``, not
+the inertia.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ from stickslip.study.planned_run import PlannedRun
 Array = np.ndarray[Any, np.dtype[np.float64]]
 FAMILIES = ("axis", "machine", "friction", "law", "controller", "reference")
 POLES = ("bandwidth_hz", "damping")
+INERTIA = ("axis.inertia", "machine.inertia")
+"""The names of a run's inertia: of a rigid axis, and of a machine with imperfections."""
 ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 
 
@@ -38,6 +41,11 @@ def parts(name: str) -> tuple[str, str, int | None]:
         return family, rest, None  # its elements are numbers of their own: ripple.amplitude[0]
     match = ELEMENT.fullmatch(rest)
     return (family, match[1], int(match[2])) if match else (family, rest, None)
+
+
+def own_name(run: PlannedRun, name: str) -> str:
+    """The name by which the run has a number: an inertia is that of its axis, by whichever name it is called."""
+    return INERTIA[isinstance(run.axis, Machine)] if name in INERTIA else name
 
 
 def poles(gains: Gains, inertia: float) -> tuple[str, float, float]:
@@ -79,7 +87,7 @@ def _placeable(control: Controller) -> Gains | None:
 
 def belongs(run: PlannedRun, name: str) -> bool:
     """Whether the run has that number; a controller without compensator has no ``law.fs``."""
-    family, rest, element = parts(name)
+    family, rest, element = parts(own_name(run, name))
     value = known(run).get(f"{family}.{rest}")
     if element is not None:
         return isinstance(value, tuple) and element < len(value)  # type: ignore[arg-type]
@@ -93,7 +101,7 @@ def value_of(run: PlannedRun, name: str) -> Any:
     ------
     UnknownName
     """
-    family, rest, element = parts(name)
+    family, rest, element = parts(own_name(run, name))
     names = known(run)
     if f"{family}.{rest}" not in names or not belongs(run, name):
         raise UnknownName(f"number of run {run.key}", name, names)
@@ -114,7 +122,7 @@ def varied(run: PlannedRun, values: Mapping[str, Any]) -> PlannedRun:
     """
     sorted_: dict[str, dict[str, Any]] = {family: {} for family in FAMILIES}
     for name, value in values.items():
-        family, rest, element = parts(name)
+        family, rest, element = parts(own_name(run, name))
         if element is not None:
             whole = list(sorted_[family].get(rest, value_of(run, f"{family}.{rest}")))
             whole[element] = value
@@ -192,7 +200,7 @@ def as_columns(run: PlannedRun, values: Mapping[str, Array]) -> dict[str, Array]
                 base[:, element] = column
                 column = base
             out[whole] = column
-        elif name == "axis.inertia":
+        elif name in INERTIA:
             out["inertia"] = column
         elif family == "controller" and rest in (*POLES, *Gains._fields):
             settings[rest] = column

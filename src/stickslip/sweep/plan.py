@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.config import Table, read_toml
-from stickslip.errors import ConfigError, InputError, suggestion
+from stickslip.errors import ConfigError, suggestion
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import read_identified
 from stickslip.simulation.many import simd_batch
@@ -21,8 +21,9 @@ from stickslip.study import plan as studies
 from stickslip.study.plan import Study
 from stickslip.study.planned_run import PlannedRun
 from stickslip.study.provenance import file_hash
-from stickslip.sweep.numbers import belongs, value_of, varied
-from stickslip.sweep.ranges import admitted, usual
+from stickslip.sweep.checked_numbers import check_numbers
+from stickslip.sweep.numbers import belongs, own_name, value_of
+from stickslip.sweep.ranges import usual
 from stickslip.sweep.sample import LEVEL, METHODS, Drawn, Spread, count_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -111,12 +112,29 @@ class Sweep:
             content += [self.step, self.device]
         return hashlib.sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
 
+    def places(self, run: PlannedRun) -> dict[str, int]:
+        """Which of the numbers drawn each number of a run that varies is, by the name that it has there."""
+        found: dict[str, int] = {}
+        for i, name in enumerate(self.drawn.names):
+            own = own_name(run, name)
+            # An inertia drawn under both names is, for each kind of axis, that of its own name.
+            if belongs(run, name) and (own not in found or name == own):
+                found[own] = i
+        return found
+
+    def varied(self, run: PlannedRun) -> list[str]:
+        """The numbers that vary in a run, as the sweep's file names them."""
+        return [self.drawn.names[i] for i in sorted(self.places(run).values())]
+
+    def listed(self, run: PlannedRun, numbers: Array) -> Array:
+        """The numbers drawn, NaN where the run has no such number, shape (n, names)."""
+        kept = {*self.places(run).values(), *(i for i, n in enumerate(self.drawn.names) if n == LEVEL)}
+        return np.where([i in kept for i in range(len(self.drawn.names))], numbers, np.nan)
+
     def values(self, run: PlannedRun, numbers: Array) -> dict[str, Array]:
         """What the numbers drawn are in a run, by name, shape (n,) or (n, elements); only those that it has."""
         out: dict[str, Array] = {}
-        for i, name in enumerate(self.drawn.names):
-            if not belongs(run, name):
-                continue
+        for name, i in self.places(run).items():
             column = numbers[:, i]
             if i < len(self.drawn.spreads) and self.drawn.spreads[i].factor:
                 base = value_of(run, name)
@@ -173,7 +191,7 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
         name, title, runs, drawn, tuple(metrics), check, study, table.values, path, dict(table.document.files),
         tuple(tuned), percentile, step, device, left_out,
     )  # fmt: skip
-    _check(found, table)
+    check_numbers(found, table)
     return found
 
 
@@ -319,62 +337,3 @@ def _estimates(
     matrix = found.correlation[np.ix_(kept, kept)]
     rows = tuple(tuple(map(float, row)) for row in matrix)
     return tuple(found.estimates[i] for i in kept), rows, left_out
-
-
-# ---- bad sweeps are told before anything runs ------------------------------------------------------------------
-
-
-def _check(sweep: Sweep, table: Table) -> None:
-    """Every number belongs to a run, and the runs at both ends of every range can be run."""
-    for name in (*sweep.drawn.names, *(s.name for s in sweep.tuned)):
-        if name != LEVEL and not any(belongs(run, name) for run in sweep.runs):
-            allowed = list(dict.fromkeys(k for run in sweep.runs for k in _all_numbers(run)))
-            raise ConfigError(
-                f"{table.label('vary')}: no run has a number {name!r}; {suggestion(name, allowed)}"
-            )
-    for run in sweep.runs:
-        for numbers in _ends(sweep.drawn):
-            _try(
-                run, {k: _plain(v[0]) for k, v in sweep.values(run, numbers[None, :]).items()}, table, "vary"
-            )
-        # Where a law's numbers exclude each other within their usual ranges, the search finds out.
-        given = [s for s in sweep.tuned if sweep.config["tune"][s.name]]
-        for s in (s for s in given if belongs(run, s.name)):
-            base = value_of(run, s.name)
-            if isinstance(base, tuple):
-                raise ConfigError(f"{table.label('tune')}: {s.name} is a list; name an element, {s.name}[0]")
-            for end in (s.low, s.high):
-                number = end * (base if s.factor else 1.0)
-                _try(run, {s.name: admitted(run, s.name, number)}, table, "tune")
-
-
-def _try(run: PlannedRun, values: Mapping[str, Any], table: Table, key: str) -> None:
-    """Refuse numbers at the end of a range with which the run cannot be run."""
-    try:
-        varied(run, values)
-    except InputError as error:
-        raise ConfigError(f"{table.label(key)}: run {run.key} at the end of a range: {error}") from None
-
-
-def _all_numbers(run: PlannedRun) -> list[str]:
-    from stickslip.sweep.numbers import known
-
-    return list(known(run))
-
-
-def _ends(drawn: Drawn) -> list[Array]:
-    """Every number at its lowest and at its highest while the others are in the middle."""
-    middle = [0.5 * (s.low + s.high) for s in drawn.spreads] + [e.value for e in drawn.estimates]
-    middle += [1.0] if drawn.nested else []
-    out: list[Array] = []
-    for i, s in enumerate(drawn.spreads):
-        for end in (s.low, s.high):
-            numbers = np.array(middle)
-            numbers[i] = end
-            out.append(numbers)
-    return out or [np.array(middle)]
-
-
-def _plain(value: Any) -> Any:
-    """A number or a list of them, as Python has them."""
-    return value.tolist() if isinstance(value, np.ndarray) else float(value)

@@ -12,11 +12,14 @@ import numpy as np
 
 from stickslip.errors import unwritable
 from stickslip.study.files import KEYS
+from stickslip.sweep.checked_numbers import not_varied, not_varied_lines
 from stickslip.sweep.dataset import read
 from stickslip.sweep.plan import Sweep
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 PERCENTILES = (5, 50, 95, 100)
+BETWEEN = ", "
+"""Between the numbers that a row says varied"""
 LEAST_CASES = 20
 """Fewer cases than this say nothing of a percentile."""
 
@@ -37,7 +40,7 @@ def meaning_of_flags(sweep: Sweep) -> str:
 
 
 def summarise(folder: Path, sweep: Sweep) -> list[dict[str, Any]]:
-    """A row a run: its key, numbers of cases, flagged and failed ones, and percentiles of every metric."""
+    """A row a run: its key, what varied in it, its cases, those flagged and failed, percentiles of every metric."""
     rows: list[dict[str, Any]] = []
     for run in sweep.runs:
         columns = read(folder, sweep, run, [*sweep.metrics, "flagged"])
@@ -49,7 +52,8 @@ def summarise(folder: Path, sweep: Sweep) -> list[dict[str, Any]]:
             row[f"{name}_missing"] = int(first.size - values.size)
             for p in PERCENTILES:
                 row[f"{name}_p{p}"] = float(np.percentile(values, p)) if values.size else float("nan")
-        rows.append(row | {"flagged_means": meaning_of_flags(sweep)})
+        row |= {"flagged_means": meaning_of_flags(sweep), "varied": BETWEEN.join(sweep.varied(run))}
+        rows.append(row | {"not_varied": BETWEEN.join(not_varied(sweep, run))})
     return rows
 
 
@@ -69,7 +73,8 @@ def write_summary(folder: Path, sweep: Sweep, rows: Sequence[Mapping[str, Any]])
 
 
 def summary_lines(rows: Sequence[Mapping[str, Any]], metric: str) -> list[str]:
-    """A line a run under a heading: percentiles of a metric, flagged and missing cases; last what flagged means."""
+    """A line a run under a heading: percentiles of a metric, flagged and missing cases; last what flagged means, and
+    which runs do not have a number that varied."""
     keys = ["/".join(str(row[part]) for part in KEYS) for row in rows]
     width = max(24, *(len(key) for key in keys))
     heads = ("5 %", "50 %", "95 %", "worst")
@@ -78,7 +83,19 @@ def summary_lines(rows: Sequence[Mapping[str, Any]], metric: str) -> list[str]:
         cells = "".join(f"{row[f'{metric}_p{p}']:>12.4g}" for p in PERCENTILES)
         flagged = f"{100.0 * row['flagged'] / max(1, row['cases']):.2f} %"
         out.append(f"{key:<{width}}{cells}{flagged:>10}{row[f'{metric}_missing']:>9}")
-    return [*out, *dict.fromkeys(f"flagged: {row['flagged_means']}" for row in rows)]
+    return [*out, *dict.fromkeys(f"flagged: {row['flagged_means']}" for row in rows), *unvaried(rows)]
+
+
+def unvaried(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Which runs do not have a number that varied."""
+    return not_varied_lines(
+        ("/".join(str(row[part]) for part in KEYS), _listed(row["varied"]), _listed(row["not_varied"]))
+        for row in rows
+    )
+
+
+def _listed(joined: str) -> list[str]:
+    return joined.split(BETWEEN) if joined else []
 
 
 # ---- what uncertainty does ---------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.measured import measured
-from stickslip.sweep.numbers import belongs, value_of
+from stickslip.sweep.numbers import belongs, own_name, value_of
 from stickslip.sweep.plan import Sweep
 from stickslip.sweep.ranges import admitted
 from stickslip.sweep.sample import Spread
@@ -134,7 +134,7 @@ def tune(sweep: Sweep, run: PlannedRun, progress: Callable[[int, int], None] | N
     about = POPULATION * len(spreads) * (GENERATIONS + 1)
 
     def score(numbers: Array) -> Array:
-        settings = {s.name: np.full(sweep.drawn.cases, x) for s, x in zip(spreads, numbers)}
+        settings = {own_name(run, s.name): np.full(sweep.drawn.cases, x) for s, x in zip(spreads, numbers)}
         found = measured(run, uncertain | settings, sweep.metrics, sweep.drawn.cases)
         return percentiles(found.metrics, sweep.percentile)
 

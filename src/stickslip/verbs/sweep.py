@@ -19,7 +19,8 @@ from stickslip.identify.estimate import silent
 from stickslip.sweep import dataset, execute
 from stickslip.sweep.gains import too_few
 from stickslip.sweep.plan import MOST_CASES, Sweep, load
-from stickslip.sweep.summary import summarise, summary_lines, write_summary
+from stickslip.sweep.sample import LEVEL
+from stickslip.sweep.summary import summarise, summary_lines, unvaried, write_summary
 
 if TYPE_CHECKING:
     import pandas
@@ -40,8 +41,9 @@ class SweepResult:
     folder : Path
         Where the data set, manifest.json and summary.csv are.
     rows : sequence of mapping
-        One a run: its slip rule, reference, friction and controller, cases, flagged ones, percentiles of every
-        metric (``position_rms_rad_p95``), and what flagged means (``flagged_means``).
+        One a run: its slip rule, reference, friction and controller, the numbers that varied in it (``varied``) and
+        those that it does not have (``not_varied``), cases, flagged ones, percentiles of every metric
+        (``position_rms_rad_p95``), and what flagged means (``flagged_means``).
     manifest : mapping
         What was run, with which versions, and how long it took.
     files : tuple of Path
@@ -58,6 +60,9 @@ class SweepResult:
     def columns(self, row: int = 0) -> Mapping[str, Array]:
         """What every case of a run varied and gave, by name, shape (cases,).
 
+        First the numbers that vary in the run, as drawn (factors where the file gives factors), then the sweep's
+        metrics, NaN where a case has none, and ``flagged``.
+
         Parameters
         ----------
         row : int
@@ -70,8 +75,9 @@ class SweepResult:
         """
         if not 0 <= row < len(self.sweep.runs):
             raise InputError(f"columns: row = {row} must be from 0 to {len(self.sweep.runs) - 1}")
-        names = [*self.sweep.metrics, "flagged"]
-        return dataset.read(self.folder, self.sweep, self.sweep.runs[row], names)
+        run, drawn = self.sweep.runs[row], self.sweep.drawn
+        names = [*self.sweep.varied(run), *([LEVEL] if drawn.nested else []), *self.sweep.metrics, "flagged"]
+        return dataset.read(self.folder, self.sweep, run, names)
 
     def to_pandas(self) -> pandas.DataFrame:
         """`rows` as a data frame.
@@ -103,7 +109,8 @@ class SweepResult:
             name = "/".join(str(row[part]) for part in ("slip_rule", "reference", "friction", "controller"))
             cells = [f"{row[f'{metric}_p{p}']:.4g}" for p in (5, 50, 95, 100)] + [str(row["cases"])]
             body += f"<tr><td>{escape(name)}</td>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>"
-        return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        notes = "".join(f"<p>{escape(line)}</p>" for line in unvaried(self.rows))
+        return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{notes}"
 
 
 @arguments_checked
