@@ -11,6 +11,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
+from stickslip.control.linear import place
 from stickslip.errors import ConfigError
 from stickslip.machines.files import LIBRARY, machine
 from stickslip.machines.machine import IMPERFECTIONS
@@ -228,6 +229,64 @@ def test_an_ideal_axis_beside_a_machine_has_no_sample_time_to_give(study: Path) 
         load(study)
     study.write_text(axis + STUDY + OBSERVED + "sample_time = 1e-3\n")
     assert {r.friction for r in load(study).runs} >= {"rigid", "all"}
+
+
+def test_gains_are_placed_for_the_inertia_of_each_axis_unless_the_file_gives_one(
+    study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A machine beside a rigid axis had the gains, and the inertias left out, of the other."""
+    axis = '[axis]\ninertia = 1e-3\n\n[friction.rigid]\nlaw = "coulomb"\nfc = 0.3\n\n'
+    text = STUDY.partition("[machines.bare]")[0] + STUDY[STUDY.index("[references.low]") :]
+    fed = '[controllers.fed]\nsample_time = 1e-3\nloop = {law = "pd"}\nfeedforward = {law = "inertia_feedforward"}\n'
+    study.write_text(axis + text.replace("duration = 1.0", "duration = 0.1") + fed)
+    loops = {(r.friction, r.controller): r.control for r in load(study).runs}
+    gains = {f: loops[f, "PD"].gains for f in ("rigid", "all")}
+    assert gains["rigid"] == place("PD", 1e-3, 10.0, 0.85)
+    assert gains["all"] == place("PD", machine("thesis-dry").inertia, 10.0, 0.85)
+    assert loops["all", "fed"].numbers()["feedforward_inertia"] == machine("thesis-dry").inertia
+    assert main(["study", str(study), "--out", str(study.parent / "out"), "--only", "PD"]) == 0
+    said = "gains that are placed, and inertias left out, are those of each axis: rigid 0.001, all 0.00042757 kg·m²"
+    assert said in capsys.readouterr().out
+    assert said in (study.parent / "out" / "report.html").read_text(encoding="utf-8")
+    study.write_text("design_inertia = 5e-4\n" + study.read_text())
+    assert {r.control.gains for r in load(study).runs if r.controller == "PD"} == {
+        place("PD", 5e-4, 10.0, 0.85)
+    }
+
+
+TWO = """
+[machines.a]
+machine = "thesis-dry"
+
+[machines.b]
+machine = "thesis-grease"
+"""
+
+
+def test_controllers_on_two_machines_hold_what_was_identified_on_each(study: Path) -> None:
+    """Such a study could not be run, and what its error advised did not help."""
+    rest = STUDY[STUDY.index("[references.low]") :]
+    study.write_text(TWO + rest)
+    held = {r.friction: r.control.compensator.model for r in load(study).runs if r.control.compensator}
+    assert held == {"a": machine("thesis-dry").models["lugre"], "b": machine("thesis-grease").models["lugre"]}
+    study.write_text(TWO + rest + '\n[laws.lugre]\nlaw = "coulomb"\nfc = 0.2\n')
+    held = {r.friction: r.control.compensator.model for r in load(study).runs if r.control.compensator}
+    assert held == dict.fromkeys("ab", ss.Model("coulomb", fc=0.2))
+
+
+def test_a_law_of_two_machines_on_a_third_axis_is_asked_for(study: Path) -> None:
+    axis = '[axis]\ninertia = 4e-4\n\n[friction.rigid]\nlaw = "coulomb"\nfc = 0.3\n\n'
+    rest = STUDY[STUDY.index("[references.low]") :]
+    said = r"study\.toml: controllers\.FF on rigid: 'lugre' is another law on .* a, b; give .* as \[laws\.lugre\]"
+    study.write_text(axis + TWO + rest)
+    with pytest.raises(ConfigError, match=said):
+        load(study)
+    drawn = '\n[responses.r]\nreference = "low"\nlaws = ["lugre"]\n'
+    study.write_text(TWO + rest + drawn)
+    with pytest.raises(ConfigError, match=r"study\.toml: responses\.r\.laws: 'lugre' is another law on"):
+        load(study)
+    study.write_text(axis + TWO + rest.partition("[controllers.FF]")[0])
+    assert {r.friction for r in load(study).runs} == {"rigid", "a", "b"}
 
 
 def test_a_single_run_and_a_sweep_take_the_machines_sample_time(run: Path, study: Path) -> None:

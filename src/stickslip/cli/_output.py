@@ -194,6 +194,8 @@ def print_study(result: StudyResult, report: Path | None, kept: int) -> None:
 
     `kept` is how many runs metrics.csv holds.
     """
+    from stickslip.study.result import designed_for
+
     for rule in _each(result.runs, "slip_rule"):
         for reference in _each(result.runs, "reference"):
             runs = [r for r in result.runs if (r.slip_rule, r.reference) == (rule, reference)]
@@ -208,6 +210,8 @@ def print_study(result: StudyResult, report: Path | None, kept: int) -> None:
     times = {entry["sample_time_s"] for entry in result.manifest["runs"]} - {0.0}
     if times:
         print(f"controllers sampled every {', '.join(f'{time:g}' for time in sorted(times))} s")
+    if said := designed_for(result.manifest):
+        print(said)
     print_starts(result.runs)
     for path in (result.folder / "metrics.csv", result.folder / "manifest.json", report):
         if path:

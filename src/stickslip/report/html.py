@@ -14,6 +14,7 @@ from stickslip.report.conclusions import study_conclusion
 from stickslip.report.figures import COMMON, Figure
 from stickslip.report.page import filled
 from stickslip.report.plots import embedded
+from stickslip.study.result import designed_for
 from stickslip.thesis.claims import Claim, Verdict, judge
 from stickslip.thesis.edition import SLIP, Note
 
@@ -65,6 +66,7 @@ def _ran(view: StudyView) -> str:
         f"slip rules: {', '.join(view.rules)}",
     ]
     version = view.result.manifest.get("versions", {}).get("stickslip", "")
+    words += [said for said in [designed_for(view.result.manifest)] if said]
     return f"{count} runs in {seconds:.1f} s of CPU: {'; '.join(words)}. stickslip {version}".strip()
 
 

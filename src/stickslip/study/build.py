@@ -76,6 +76,11 @@ def axis(table: Table, friction: Model) -> RigidAxis:
         )
 
 
+def design_inertia(table: Table) -> float:
+    """The inertia that a study's file places gains with, kg·m²; 0 where it leaves that to each axis."""
+    return table.positive("design_inertia", "kg·m²") if table.has("design_inertia") else 0.0
+
+
 def sample_time_of(axis: RigidAxis | Machine) -> float:
     """The sample time that the axis gives its controllers, s; 0 where it leaves it to them."""
     return axis.sample_time if isinstance(axis, Machine) else 0.0

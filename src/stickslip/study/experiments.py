@@ -181,7 +181,7 @@ def planned_experiments(table: Table) -> list[ExperimentRun]:
     plants = build.machines(table.tables("machines"))
     motions = {name: build.motion(t) for name, t in table.tables("references").items()}
     laws, files = build.models(table.tables("laws"), build.law_files(table)), build.law_files(table)
-    inertia = table.positive("design_inertia", "kg·m²") if table.has("design_inertia") else 0.0
+    inertia = build.design_inertia(table)
     controllers = table.tables("controllers")
     experiments = [_experiment(name, t, plants, motions) for name, t in table.tables("experiments").items()]
     compared = {

@@ -217,7 +217,7 @@ def write_manifest(
         "only": list(only or ()),
         "configuration": study.config,
         "timings": dict(timings),
-        "runs": [_entry(folder, p, results[p.key]) for p in planned],
+        "runs": [_entry(folder, p, results[p.key], study) for p in planned],
     }
     return save_manifest(folder, {"study": study.name, "title": study.title}, inputs, content)
 
@@ -246,12 +246,13 @@ def save_manifest(
     return manifest
 
 
-def _entry(folder: Path, planned: PlannedRun, run: Run) -> dict[str, Any]:
+def _entry(folder: Path, planned: PlannedRun, run: Run, study: Study) -> dict[str, Any]:
     return {
         "run": run.key,
         "fingerprint": planned.fingerprint,
         "record": run.path.relative_to(folder).as_posix(),
         "sample_time_s": planned.control.sample_time,
+        "design_inertia_kg_m2": float(study.config.get("design_inertia", planned.axis.inertia)),
         "cpu_s": run.seconds,
         "failure": run.failure,
         "metrics": {k: None if math.isnan(v) else v for k, v in run.metrics.items()},

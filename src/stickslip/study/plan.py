@@ -16,6 +16,7 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.study import build
 from stickslip.study.build import Numerics, Placement
+from stickslip.study.known_laws import Design, KnownLaws, laws_in
 from stickslip.study.planned_run import FAMILIES, OWN, PlannedRun
 from stickslip.study.result import Run
 
@@ -174,7 +175,7 @@ def load_run(path: Path) -> PlannedRun:
         rule = table.choice("slip_rule", SLIP_RULES) if table.has("slip_rule") else None
         files = build.law_files(table)
         axis = _axis(table, files)
-        known = _models_of({"": axis}) if isinstance(axis, Machine) else {}
+        known = axis.models if isinstance(axis, Machine) else dict[str, Model]()
         laws = {**known, **build.models(table.tables("laws"), files)}
         with table.table("reference") as t:
             motion = _Motion.read(t)
@@ -225,15 +226,17 @@ class _Motion:
 
 @dataclass(frozen=True)
 class _Parts:
-    """What a study names: machine, frictions, references, laws and controllers."""
+    """What a study names: machine, frictions, references, laws and controllers; the inertia for gains, 0 for each
+    axis's own."""
 
     axis: Table | None
     laws_from_files: Mapping[str, Any]
     numerics: Numerics
     motions: Mapping[str, _Motion]
     frictions: Mapping[str, RigidAxis | Machine]
-    laws: Mapping[str, Model]
+    known: KnownLaws
     controllers: Mapping[str, Table]
+    design_inertia: float
 
     @staticmethod
     def read(table: Table) -> _Parts:
@@ -256,13 +259,14 @@ class _Parts:
                 **{name: build.axis(axis, friction) for name, friction in frictions.items() if axis},
                 **machines,
             },
-            {**_models_of(machines), **build.models(table.tables("laws"), files)},
+            KnownLaws(build.models(table.tables("laws"), files), machines),
             table.tables("controllers"),
+            build.design_inertia(table),
         )
 
     @property
     def inertia(self) -> float:
-        """What gains are placed with, kg·m²: that of the axis, else of the first machine."""
+        """Of the axes that are driven in open loop, kg·m²: that of the axis, else of the first machine."""
         return next(iter(self.frictions.values())).inertia
 
     def runs(
@@ -274,14 +278,10 @@ class _Parts:
     ) -> list[PlannedRun]:
         """Every one of each with every one of the others."""
         axes = {f: self.frictions[f] for f in frictions}
-        times = {f: build.sample_time_of(axis) for f, axis in axes.items()}
-        made = {
-            (c, m, time): self._made(c, m, time)
-            for c in controllers for m in motions for time in dict.fromkeys(times.values())
-        }  # fmt: skip
+        made = {(c, m): self._on_axes(c, m, axes) for c in controllers for m in motions}
         out: list[PlannedRun] = []
         for rule, m, f, c in itertools.product(rules, motions, axes, controllers):
-            control, numerics = made[c, m, times[f]]
+            control, numerics = made[c, m][f]
             motion = self.motions[m]
             name = named_rule(rule, axes[f], control)
             out.append(
@@ -289,25 +289,31 @@ class _Parts:
             )
         return out
 
-    def _made(self, name: str, motion: str, sample_time: float) -> tuple[Controller, Numerics]:
-        """A controller along a motion on axes with that sample time (s, 0: none), and how its runs are integrated."""
+    def _on_axes(
+        self, name: str, motion: str, axes: Mapping[str, RigidAxis | Machine]
+    ) -> dict[str, tuple[Controller, Numerics]]:
+        """A controller along a motion, on each axis, and how its runs are integrated; axes that give it the same share
+        it, and it is read once."""
+        made: dict[Design, tuple[Controller, Numerics]] = {}
+        out: dict[str, tuple[Controller, Numerics]] = {}
+        for axis, one in axes.items():
+            laws = tuple(sorted(self.known.on(axis).items(), key=lambda law: law[0]))
+            design = Design(self.design_inertia or one.inertia, build.sample_time_of(one), laws)
+            if design not in made:
+                made[design] = self._made(name, motion, axis, design)
+            out[axis] = made[design]
+        return out
+
+    def _made(self, name: str, motion: str, axis: str, design: Design) -> tuple[Controller, Numerics]:
+        """A controller along a motion on an axis, and how its runs are integrated."""
+        poles, laws = self.motions[motion].placement, dict(design.laws)
         with self.controllers[name] as table:
+            self.known.insist_on(laws_in(table), laws, f"{table.label()} on {axis}")
             numerics = build.numerics(table, self.numerics)
-            poles = self.motions[motion].placement
-            made = build.controller(table, self.inertia, poles, self.laws, self.laws_from_files, sample_time)
+            made = build.controller(
+                table, design.inertia, poles, laws, self.laws_from_files, design.sample_time
+            )
         return made, numerics
-
-
-def _models_of(machines: Mapping[str, Machine]) -> dict[str, Model]:
-    """The laws that somebody identified on the machines, by name: what controllers may hold beside [laws.*]."""
-    found: dict[str, Model] = {}
-    for one in machines.values():
-        for name, model in one.models.items():
-            if found.setdefault(name, model).as_dict() != model.as_dict():
-                raise ConfigError(
-                    f"two machines have different models {name!r}; give what is meant as [laws.{name}]"
-                )
-    return found
 
 
 def _comparison(table: Table, parts: _Parts, rule: str | None) -> list[PlannedRun]:
@@ -334,9 +340,9 @@ def _comparison(table: Table, parts: _Parts, rule: str | None) -> list[PlannedRu
 def _response(name: str, table: Table, parts: _Parts) -> Response:
     with table:
         frictions = table.texts("frictions", parts.frictions) if table.has("frictions") else []
-        laws = table.texts("laws", parts.laws, "laws") if table.has("laws") else []
+        laws = parts.known.named_in(table)
         motion = parts.motions[table.choice("reference", parts.motions)]
-        models = {f: parts.frictions[f].friction for f in frictions} | {n: parts.laws[n] for n in laws}
+        models = {f: parts.frictions[f].friction for f in frictions} | laws
         return Response(name, table.text("title", name), table.text("figure", ""),
                         motion.reference, motion.duration, models)  # fmt: skip
 
@@ -344,13 +350,13 @@ def _response(name: str, table: Table, parts: _Parts) -> Response:
 def _drive(name: str, table: Table, parts: _Parts) -> Drive:
     with table:
         frictions = table.texts("frictions", parts.frictions) if table.has("frictions") else []
-        laws = table.texts("laws", parts.laws, "laws") if table.has("laws") else []
+        laws = parts.known.named_in(table)
         axes = {f: axis for f in frictions if isinstance(axis := parts.frictions[f], RigidAxis)}
         if left := [f for f in frictions if f not in axes]:
             raise table.error(
                 "frictions", f"has {left[0]!r}, a machine: in open loop only ideal axes are driven"
             )
-        axes |= {n: RigidAxis(parts.inertia, parts.laws[n]) for n in laws}
+        axes |= {n: RigidAxis(parts.inertia, law) for n, law in laws.items()}
         return Drive(
             name, table.text("title", name), table.text("figure", ""), table.positive("amplitude", "N·m"),
             table.positive("frequency", "Hz"), table.positive("duration", "s"), axes,

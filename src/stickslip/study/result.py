@@ -21,6 +21,15 @@ SHOWN = 12
 """Runs that it shows, at most."""
 
 
+def designed_for(manifest: Mapping[str, Any]) -> str:
+    """For which inertias a study's controllers were designed, in a line; empty where it is one for all."""
+    found = {run["run"].split("/")[2]: run.get("design_inertia_kg_m2", math.nan) for run in manifest["runs"]}
+    if len(set(found.values())) < 2:
+        return ""
+    each = ", ".join(f"{axis} {inertia:g}" for axis, inertia in found.items())
+    return f"gains that are placed, and inertias left out, are those of each axis: {each} kg·m²"
+
+
 @dataclass(frozen=True)
 class Run:
     """One run of a study, `slip_rule/reference/friction/controller`.
