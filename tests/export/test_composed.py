@@ -132,3 +132,50 @@ def test_the_unit_samples_by_itself_whatever_the_communication_step(steps):
         row = (float(given["position"][k]), float(given["reference"][k]), 0.0, 0.0)
         expected.append([plain(row) for _ in range(due)][-1] if due else expected[-1])
     assert answer[:, 0] == pytest.approx(expected, abs=0.0)
+
+
+SIDES = """
+import math
+from typing import Annotated, NamedTuple
+
+from stickslip.control_spec import ControlLaw
+from stickslip.spec import Par
+
+
+class Params(NamedTuple):
+    torque: Annotated[float, Par("N·m", "K", "torque", positive=True)]
+
+
+class State(NamedTuple):
+    last: Annotated[float, Par("rad/s", "s", "surface a sample ago")]
+
+
+def sample(y, z, p, u):
+    s = y.reference_velocity - y.velocity + 60.0 * y.error
+    sign = math.copysign(1.0, s) if s != 0.0 else 0.0
+    z.last += 0.5 * (abs(s) if s > 1.0 else 1.0 / (2.0 + s if s > -1.0 else 3.0)) - 0.5 * z.last
+    if (1.0 / s if s != 0.0 else 0.0) > z.last:
+        sign = sign + 0.1
+    elif s < -3.0:
+        sign = -2.0
+    return p.torque * sign + (0.1 / s if abs(s) > 1.0 else 0.1 * s) + 0.01 * z.last
+
+
+CONTROL_LAW = ControlLaw("sides", Params, sample, "loop", State=State, title="Sides", equation="T", source=("own",),
+                         example={"torque": 0.4})
+"""
+
+
+def test_conditional_expressions_are_if_statements_in_structured_text(tmp_path):
+    """A law that held every check of its contract was refused there, without the place in its file."""
+    (tmp_path / "sides.py").write_text(SIDES)
+    loop = ControlBlock(str(tmp_path / "sides.py"), torque=0.4)
+    controller = Controller(loop=loop, sample_time=T, torque_limit=1.0)
+    program = Program(controller_target("st").write(controller, "axis", False).files["axis.st"])
+    block = next(pou for pou in program.pous if "elsewhere" in program.instance(pou))
+    v, samples = program.instance(block), golden_samples(controller)
+    for row in zip(*(column.tolist() for column in samples)):
+        *given, torque, v["load"], v["temperature"] = row
+        v.update(zip(GIVEN, given))
+        program.run(block, v)
+        assert v["torque"] == pytest.approx(torque, abs=1e-11)

@@ -15,6 +15,7 @@ from typing import ClassVar
 
 from stickslip.errors import LawError
 from stickslip.export._analysis import Facts, analyse
+from stickslip.export._decided import decided
 from stickslip.export._language import ADDITIVE, AND, ATOM, CONDITION, MULTIPLICATIVE, NOT, OR, Language
 from stickslip.export._st_names import RESERVED, named_in_st
 
@@ -142,8 +143,7 @@ class _St(Language):
         return f"{left} MOD {right}", MULTIPLICATIVE
 
     def choice(self, node: ast.IfExp) -> str:
-        # SEL evaluates both, which is harmless for arithmetic without a division.
-        if any(isinstance(n, (ast.Div, ast.Call)) for n in ast.walk(node)):
+        if evaluates_too_much(node):
             raise LawError(f"`{ast.unparse(node)}` has no translation; write it as an if statement")
         return f"SEL({self.truth(node.test)}, {self.real(node.orelse)}, {self.real(node.body)})"
 
@@ -210,6 +210,11 @@ class _St(Language):
         return [*out, f"{pad}END_IF;"]
 
 
+def evaluates_too_much(node: ast.IfExp) -> bool:
+    """Whether SEL, which evaluates both sides, may fail on the one that does not count: on a division or a function."""
+    return any(isinstance(n, (ast.Div, ast.Call)) for n in ast.walk(node))
+
+
 def number(value: float) -> str:
     """A number as the norm writes it: with a point, and digits on both its sides."""
     if math.isinf(value):
@@ -226,6 +231,8 @@ def functions(
     counts: Mapping[str, int],
 ) -> list[tuple[str, str, list[str]]]:
     """Name, docstring and lines of every hoisted function, helpers and callees first."""
+    called = analyse(trees)
+    trees = {name: decided(tree, called, evaluates_too_much) for name, tree in trees.items()}
     known = analyse(trees)
     out: list[tuple[str, str, list[str]]] = []
     helpers: set[str] = set()
