@@ -344,3 +344,18 @@ def test_what_accelerates_the_inertia_is_no_compensation_to_an_observer():
     # The offset is a disturbance that is fed forward: the observer leaves it to the feedforward.
     assert errors[True, True] < 0.2 * errors[True, False]
     assert errors[True, True] == pytest.approx(errors[False, True], rel=0.1)
+
+
+@pytest.mark.parametrize(("law", "torque"), [("gains", 0.44), ("pid", 0.4)])
+def test_an_integral_held_back_at_the_limit_stays_and_its_torque_follows_the_rule_of_its_law(law, torque):
+    """As docs/reference/controllers.md has it: the torque of one holds the growth that is not kept, the other's not."""
+    p = SimpleNamespace(kp=1.0, ki=100.0, kd=0.0, kr=0.0)
+    y = SimpleNamespace(
+        started=1.0, elapsed=TIME, error=0.4, reference_velocity=0.0, velocity=0.0, others=0.5, torque_limit=0.9,
+    )  # fmt: skip
+    z = SimpleNamespace(integral=0.0, error=0.4)
+    assert control_law(law).sample(y, z, p, None) == pytest.approx(torque)
+    assert z.integral == 0.0
+    y.torque_limit = 1.0
+    assert control_law(law).sample(y, z, p, None) == pytest.approx(0.44)
+    assert z.integral == pytest.approx(0.4 * TIME)

@@ -28,6 +28,14 @@ READING = Note(
 )
 
 
+OF_MACHINES = Note(
+    "Metrics of machines",
+    "Metrics of a machine with imperfections are taken between the ends of its samples, the position as a cubic and "
+    "the velocity as a straight line. Reversals, standstills and velocities within a sample are not seen: these metrics "
+    "can be compared among machines of one sample time, and not with those of axes under [axis].",
+)
+
+
 def render(view: StudyView, figures: Sequence[Figure]) -> str:
     """The report's HTML."""
     asked = view.edition.claims
@@ -188,7 +196,8 @@ def notes(view: StudyView) -> list[Note]:
     """The notes that apply to a study."""
     edition = view.edition
     ruled = () if edition.before or view.rules == ["signed"] else (SLIP,)
-    return [*edition.before, *ruled, *starts(view), *edition.after, READING, *edition.last]
+    machines = (OF_MACHINES,) if view.result.config.get("machines") else ()
+    return [*edition.before, *ruled, *starts(view), *edition.after, READING, *machines, *edition.last]
 
 
 def starts(view: StudyView) -> list[Note]:
