@@ -31,8 +31,8 @@ READING = Note(
 OF_MACHINES = Note(
     "Metrics of machines",
     "Metrics of a machine with imperfections are taken between the ends of its samples, the position as a cubic and "
-    "the velocity as a straight line. Reversals, standstills and velocities within a sample are not seen: these metrics "
-    "can be compared among machines of one sample time, and not with those of axes under [axis].",
+    "the velocity as a straight line. Reversals, standstills and velocities within a sample are not seen: these "
+    "metrics can be compared among machines of one sample time, and not with those of axes under [axis].",
 )
 
 
