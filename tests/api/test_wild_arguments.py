@@ -81,7 +81,9 @@ def calls() -> dict[str, Call]:
     """Every one as it should be."""
     law, control, par = ss.law("coulomb"), ss.control_law("pd"), ss.law("coulomb").fields[0].par
     table = Table({"law": "coulomb", "parameters": {"fc": 0.3}}, Document("model.toml", Path()))
-    swept = SimpleNamespace(folder=Path(), sweep=SimpleNamespace(metrics=[], runs=[1, 2]))
+    drawn = SimpleNamespace(nested=False)
+    sweep = SimpleNamespace(metrics=[], runs=[1, 2], drawn=drawn, varied=lambda run: [])
+    swept = SimpleNamespace(folder=Path(), sweep=sweep)
     whole = bare(ss.RecommendationResult)
     return {
         "Amplifier": Call(ss.Amplifier, {"torque_constant": 0.2, "command": ss.Converter(12, 5.0)}),

@@ -297,7 +297,7 @@ class _Parts:
         made: dict[Design, tuple[Controller, Numerics]] = {}
         out: dict[str, tuple[Controller, Numerics]] = {}
         for axis, one in axes.items():
-            laws = tuple(sorted(self.known.on(axis).items(), key=lambda law: law[0]))
+            laws = tuple(self.known.on(axis).items())
             design = Design(self.design_inertia or one.inertia, build.sample_time_of(one), laws)
             if design not in made:
                 made[design] = self._made(name, motion, axis, design)
