@@ -81,8 +81,7 @@ def calls() -> dict[str, Call]:
     """Every one as it should be."""
     law, control, par = ss.law("coulomb"), ss.control_law("pd"), ss.law("coulomb").fields[0].par
     table = Table({"law": "coulomb", "parameters": {"fc": 0.3}}, Document("model.toml", Path()))
-    drawn = SimpleNamespace(nested=False)
-    sweep = SimpleNamespace(metrics=[], runs=[1, 2], drawn=drawn, varied=lambda run: [])
+    sweep = SimpleNamespace(metrics=[], runs=["", ""], drawn=SimpleNamespace(nested=False), varied=str.split)
     swept = SimpleNamespace(folder=Path(), sweep=sweep)
     whole = bare(ss.RecommendationResult)
     return {
