@@ -28,8 +28,6 @@ from stickslip.values import Vector
 
 SAMPLE = 100.0
 """Bytes that the schedule of one sample takes while it is made"""
-ON_A_MACHINE = 100.0
-"""Tolerances that a sub-step of a machine may be wrong by; what its loop sees is coarser by far."""
 SHORTEST = 1e-9
 """s, of a run: one-sided limits are taken a thousandth of it beside kinks and ends."""
 
@@ -65,7 +63,7 @@ def simulate(
         "auto" takes the first that can run the case, and goes on with the next where that one finds no step.
     tolerance : float
         Position error that a well-conditioned run may gather, rad (exact, adaptive and sampled). A machine's sub-steps
-        are each within a hundred times that.
+        are each within a tenth of that, or a hundred times it where the loop reads an encoder, which is coarser by far.
     time_step : float
         Longest step of the fixed integrator, s; it runs controllers in continuous time.
     slip_rule : {"signed", "literal"}, optional
@@ -119,7 +117,7 @@ def simulate(
         return machine_loop.simulate_machine(
             axis, controller, reference, duration,
             output=output, slip_rule=slip_rule, initial=initial, metered=metered, check=check,
-            tolerance=ON_A_MACHINE * tolerance,
+            tolerance=machine_loop.sub_step_tolerance(axis, tolerance),
         )  # fmt: skip
     case = prepare(
         axis, controller, reference, duration,

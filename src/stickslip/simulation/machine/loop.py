@@ -47,6 +47,9 @@ SURE = 1.5
 """Of what two runs lie apart: the finer one has an error too, a tenth to a third of the other's."""
 LEAST = 0.01
 """Of the tolerance: what two runs that agree may still have in common."""
+READ, EXACT = 100.0, 0.1
+"""Of a run's tolerance, that a sub-step may be wrong by: where the loop reads counts of an encoder, which are coarser
+by far; and where it reads the position itself. A contact that creeps before it breaks away makes 1e4 of an error."""
 ON_TIME = 1e-6
 """Samples by which output times may lie beside a sample."""
 
@@ -116,6 +119,11 @@ def simulate_machine(
         why = REASONS.get(runs[0].code) or no_torque(controller, runs[0].memory, ended, machine.sample_time)
         raise Divergence(f"the run ended at {ended:.6g} s: {why}", ended, record)
     return record
+
+
+def sub_step_tolerance(machine: Machine, tolerance: float) -> float:
+    """What a sub-step of a machine may be wrong by in a run that is to be right to `tolerance`, rad."""
+    return (READ if machine.encoder.counts else EXACT) * tolerance
 
 
 def _results(runs: list[_Ran], tolerance: float, metered: bool) -> dict[str, Any]:
