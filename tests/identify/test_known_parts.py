@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.cli import main
 from stickslip.errors import InputError
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.estimate import Estimate, Identification
@@ -71,6 +74,25 @@ def test_least_squares_of_everything_hold_nothing(record: Experiment) -> None:
             inverse=True,
             inertia=TRUE["inertia"],
         )
+
+
+def test_the_command_takes_a_known_inertia(
+    record: Experiment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = np.column_stack([record.time, record.position, record.signal()])
+    np.savetxt(
+        tmp_path / "log.csv",
+        columns,
+        delimiter=",",
+        header="time [s],position [rad],torque [N·m]",
+        comments="",
+    )
+    command = ["identify", str(tmp_path / "log.csv"), "--law", "coulomb", "--json", "--inertia"]
+    assert main([*command, "0.004"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {e["name"] for e in found["estimates"]} == {"fc", "sigma2", "offset"}
+    assert main([*command, "-1"]) == 2
+    assert capsys.readouterr().err == "stickslip: --inertia -1 kg·m² must be greater than 0\n"
 
 
 def test_a_law_that_means_another_level_is_not_told_of_it(

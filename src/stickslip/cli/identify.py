@@ -109,6 +109,9 @@ def _law_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[reportPrivateUsage]
     """What only the method `axis` (and `inertia`) looks at."""
+    parser.add_argument(
+        "--inertia", type=float, metavar="J", help="known inertia, kg·m² (kg of a linear axis): not fitted"
+    )
     parser.add_argument("--inverse", action="store_true", help="linear least squares only, no simulation")
     parser.add_argument(
         "--per-direction", action="store_true", help="separate friction parameters for each direction"
@@ -230,6 +233,7 @@ def options_of(args: argparse.Namespace) -> dict[str, Any]:
         "method": args.method, "law": args.law, "hold_out": args.validation, "model": args.model, "noise": args.noise,
         "values": named_numbers([*args.set, *(p for p in fixed if "=" in p)]),
         "frozen": [p.partition("=")[0] for p in args.freeze], "free": [p.partition("=")[0] for p in args.free],
+        "inertia": args.inertia,
         "torque_channel": args.torque or "", "elements": args.elements, "threshold": args.threshold,
         "loop": args.loop, "loop_output": args.loop_output, "inverse": args.inverse,
         "per_direction": args.per_direction, "pendulum": args.pendulum, "drive_gain": args.drive_gain,
