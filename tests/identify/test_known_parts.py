@@ -91,6 +91,7 @@ def test_the_command_takes_a_known_inertia(
     assert main([*command, "0.004"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert {e["name"] for e in found["estimates"]} == {"fc", "sigma2", "offset"}
+    assert "Known, not fitted: inertia = 0.004 kg·m²." in found["notes"]
     assert main([*command, "-1"]) == 2
     assert capsys.readouterr().err == "stickslip: --inertia -1 kg·m² must be greater than 0\n"
 

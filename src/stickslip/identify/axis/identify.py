@@ -31,7 +31,7 @@ from stickslip.identify.axis.drifting import at_the_middle, on_drift
 from stickslip.identify.axis.exponent import is_open, named_for_both, shown
 from stickslip.identify.axis.form import TOLD_BY_SLIDING
 from stickslip.identify.axis.in_sentences import on_bend, on_creep, on_swing, on_timing, on_width
-from stickslip.identify.axis.known import known_to_sliding, refuse_a_known_torque, refuse_a_weight
+from stickslip.identify.axis.known import known_to_sliding, on_known, refuse_a_known_torque, refuse_a_weight
 from stickslip.identify.axis.law_fit import Evidence, against_sliding, estimated
 from stickslip.identify.axis.output import judged
 from stickslip.identify.axis.result import assembled, narrow_note, noted
@@ -142,6 +142,7 @@ def identify_axis(
     refuse_harmonics(experiments, extras.harmonics + extras.friction_harmonics, simulated=True)
     known = known_to_sliding(asked, tried, per_direction)
     evidence, notes = looked_at(experiments, validation, axis, extras, skew, per_direction, regress, known)
+    notes = [*on_known(known, axis), *notes]
     if per_direction:
         refuse_a_weight(evidence.sliding, axis)
     if evidence.inverse is None:

@@ -11,6 +11,9 @@ from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
 from stickslip.spec import Law
 
+UNITS = {"inertia": "kg·m²", "offset": "N·m"}
+"""Parts of an axis beside its friction."""
+
 
 def refuse_a_weight(sliding: Regression | None, axis: ServoAxis) -> None:
     """Refuse friction per direction where it would drive the axis in one of them: a constant torque acts.
@@ -42,6 +45,12 @@ def known_to_sliding(asked: Asked, laws: Sequence[Law], per_direction: bool) -> 
     elif all(by_usual_names(law) for law in laws):
         names |= {"fc", "sigma2"}
     return {n: float(asked.values[n]) for n in asked.frozen if n in names and n in asked.values}
+
+
+def on_known(known: Mapping[str, float], axis: ServoAxis) -> list[str]:
+    """Which parts of the axis beside friction were held, and at what, in a sentence; nothing where none was."""
+    parts = [f"{n} = {known[n]:g} {axis.unit(u)}" for n, u in UNITS.items() if n in known]
+    return [f"Known, not fitted: {', '.join(parts)}."] if parts else []
 
 
 def refuse_a_known_torque(frozen: Sequence[str], values: Mapping[str, float], axis: ServoAxis) -> None:
