@@ -87,7 +87,8 @@ def test_the_command_takes_a_known_inertia(
         header="time [s],position [rad],torque [N·m]",
         comments="",
     )
-    command = ["identify", str(tmp_path / "log.csv"), "--law", "coulomb", "--json", "--inertia"]
+    out = ["--out", str(tmp_path / "model.toml")]
+    command = ["identify", str(tmp_path / "log.csv"), *out, "--law", "coulomb", "--json", "--inertia"]
     assert main([*command, "0.004"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert {e["name"] for e in found["estimates"]} == {"fc", "sigma2", "offset"}
