@@ -10,7 +10,7 @@ import pytest
 from stickslip.cli import main
 from stickslip.errors import ConfigError
 from stickslip.simulation.many import simd_batch
-from stickslip.sweep import block, metric_check
+from stickslip.sweep import block, forecast, metric_check
 from stickslip.sweep.plan import load
 from support.sweeps import SMALL, table
 
@@ -70,6 +70,11 @@ def test_a_missing_gpu_is_told_before_anything_runs(tmp_path, capsys):
     assert main(["sweep", str(path), "--out", str(tmp_path / "out")]) == 2
     assert "looked for NVIDIA's driver" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("device", "cases"), [("cpu", 256), ("gpu", 16_384)])
+def test_a_block_fills_the_device(tmp_path, device, cases):
+    assert forecast.size_timed(load(in_lanes(tmp_path, f'device = "{device}"')), 0) == cases
 
 
 def test_what_lanes_do_not_measure_is_told(tmp_path):

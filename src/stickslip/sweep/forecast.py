@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stickslip.sweep.block import compute_cases, integrator_of
-from stickslip.sweep.plan import BLOCK, Sweep
+from stickslip.sweep.plan import BLOCK, GPU_BLOCK, Sweep
 
 MOST_TIMED, SHARE = 16, 0.05
 """Cases timed of every run, at most, and as part of all that it has."""
@@ -46,10 +46,15 @@ def block_size(pace: float) -> int:
     return max(1, min(BLOCK, 2 ** math.floor(math.log2(IN_HAND / pace)))) if pace > 0.0 else BLOCK
 
 
+def at_once(sweep: Sweep) -> int:
+    """Cases that fill the device which runs the lanes."""
+    return GPU_BLOCK if sweep.device == "gpu" else BLOCK
+
+
 def size_timed(sweep: Sweep, run: int) -> int:
     """The same of a run that nobody has timed, from a single case of it; lanes are filled by whole blocks."""
     if integrator_of(sweep, run)[0] == "lanes":
-        return BLOCK
+        return at_once(sweep)
     _timed(sweep, run, [0])  # It compiles.
     return block_size(_timed(sweep, run, [sweep.drawn.cases // 2]))
 
@@ -59,7 +64,7 @@ def _pace_of(sweep: Sweep, run: int, patience: float) -> float:
     cases = sweep.drawn.cases
     if integrator_of(sweep, run)[0] == "lanes":
         # Lanes are filled by whole blocks.
-        chunk = most = min(BLOCK, cases)
+        chunk = most = min(at_once(sweep), cases)
     else:
         chunk, most = CHUNK, min(MOST_TIMED, max(CHUNK, int(SHARE * cases)))
     spent, timed = 0.0, 0

@@ -28,8 +28,8 @@ from stickslip.sweep.sample import LEVEL, METHODS, Drawn, Spread, count_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 BUILT_IN = ("thesis-robustness", "thesis-gain")
-BLOCK = 256
-"""Cases in a file of the data set, at most."""
+BLOCK, GPU_BLOCK = 256, 16_384
+"""Cases in a file of the data set, at most, and where a GPU runs lanes: it is not filled by fewer."""
 USUAL = ("position_rms_rad", "position_peak_rad", "velocity_rms_rad_s", "torque_rms_Nm")
 MADE_BY = ("block.py", "measured.py", "metric_check.py")
 """What the numbers of a case come from, besides the engine."""
