@@ -18,13 +18,14 @@ from numba import types
 from numba.core.ccallback import CFunc
 
 from stickslip.jit.addresses import SIGNATURES, pointer_at
+from stickslip.jit.inner import InnerCompiler
 from stickslip.jit.kept import cached, decorating, loaded
 from stickslip.spec import Law
 from stickslip.subset import Layout, law_layouts, lower
 
 NO_ADDRESS: dict[str, Any] = {"no_cfunc_wrapper": True}
 """For functions that nobody calls by address: numba would compile each once more with a C signature."""
-INNER: dict[str, Any] = {"no_cpython_wrapper": True, **NO_ADDRESS}
+INNER: dict[str, Any] = {"no_cpython_wrapper": True, "pipeline_class": InnerCompiler, **NO_ADDRESS}
 """For functions that compiled code alone calls."""
 
 
