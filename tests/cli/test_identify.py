@@ -54,6 +54,8 @@ def test_a_log_becomes_a_model_that_is_read_back(
                 LOOP,
                 "--torque-is",
                 "commanded",
+                "--delay",
+                "0",
                 "--out",
                 str(out),
                 "--json",

@@ -75,8 +75,8 @@ def test_a_name_that_means_another_thing_is_a_name(tmp_path: Path, record: dict[
     folders = [tmp_path / "own", tmp_path / "renamed"]
     for folder in folders:
         folder.mkdir()
-    found = ss.identify(law=written(folders[0], {}), torque_is="actual", **record)
-    renamed = ss.identify(law=written(folders[1], OTHER), torque_is="actual", **record)
+    found = ss.identify(law=written(folders[0], {}), torque_is="actual", delay=0.0, **record)
+    renamed = ss.identify(law=written(folders[1], OTHER), torque_is="actual", delay=0.0, **record)
     for name, other in OTHER.items():
         assert found[name].value == pytest.approx(renamed[other].value, rel=1e-6)
         assert found[name].identified == renamed[other].identified
@@ -119,7 +119,7 @@ def test_an_excess_that_is_called_fs_is_no_static_torque(
     (tmp_path / "excess.py").write_text(text.replace('"cauchy"', '"excess"'), encoding="utf-8")
     law = plugins.law(str(tmp_path / "excess.py"))
     assert not static_by_name(Model(law, fc=0.5, fs=0.2, vs=0.3, sigma2=0.02))
-    found = ss.identify(law=str(tmp_path / "excess.py"), torque_is="actual", **record)
+    found = ss.identify(law=str(tmp_path / "excess.py"), torque_is="actual", delay=0.0, **record)
     assert found["fs"].value == pytest.approx(0.2, rel=0.05)
 
 
@@ -129,14 +129,14 @@ def test_a_curve_that_ends_in_a_large_number_does_not_end_the_identification(
     """`math.cosh` of a speed that no record has is an OverflowError in plain Python."""
     text = CAUCHY.replace("p.df / (1.0 + r * r)", "p.df / math.cosh(r)").replace('"cauchy"', '"sech"')
     (tmp_path / "sech.py").write_text(text, encoding="utf-8")
-    found = ss.identify(law=["coulomb", str(tmp_path / "sech.py")], torque_is="actual", **record)
+    found = ss.identify(law=["coulomb", str(tmp_path / "sech.py")], torque_is="actual", delay=0.0, **record)
     assert found.model is not None
 
 
 def test_a_law_of_ones_own_that_falls_is_compared(tmp_path: Path, record: dict[str, np.ndarray]) -> None:
     """It has no `fs`; those that cannot fall are left out, and that is said."""
     found = ss.identify(
-        law=["coulomb", "stribeck_plain", written(tmp_path, {})], torque_is="actual", **record
+        law=["coulomb", "stribeck_plain", written(tmp_path, {})], torque_is="actual", delay=0.0, **record
     )
     (said,) = (note for note in found.notes if note.startswith("Not compared"))
     assert said.endswith(": coulomb.")

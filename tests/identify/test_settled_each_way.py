@@ -132,6 +132,6 @@ def test_cogging_that_is_allowed_for_is_not_missed() -> None:
     q, v, a = sines(t, ((6.0, 0.25, 0.0), (2.5, 0.7, 1.0), (0.4, 2.1, 2.0)))
     noise = 0.005 * np.random.default_rng(7).standard_normal(t.size)
     torque = 0.003 * a + 0.3 * np.sign(v) + 0.002 * v + 0.3 * np.sin(8.0 * q) + noise
-    found = ss.identify(t=t, position=q, torque=torque, law="coulomb", torque_is="actual")
+    found = ss.identify(t=t, position=q, torque=torque, law="coulomb", torque_is="actual", delay=0.0)
     assert found["inertia"].identified
     assert found["fc"].identified

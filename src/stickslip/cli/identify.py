@@ -143,12 +143,12 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
     parser.add_argument(
         "--torque-is", choices=("commanded", "actual", "mean"),
         help="meaning of the torque column: commanded from this row to the next, actual at the row, or "
-        "mean since the previous row (default: found from the record)",
+        "mean since the previous row; held together with --delay, without which when the torque acted is found from "
+        "the record (default)",
     )  # fmt: skip
     parser.add_argument(
         "--delay", type=float, metavar="S",
-        help="delay until the torque acts (current loop, dead time), s; 0 if only --torque-is is given, which is "
-        "commanded if only this is",
+        help="delay until the torque acts (current loop, dead time), s; with it alone the column counts as commanded",
     )  # fmt: skip
     parser.add_argument(
         "--harmonics",

@@ -328,7 +328,8 @@ def advice(estimates: Sequence[Estimate], law: Law, doubt: str = "") -> tuple[st
     stiff = {n for n in missing if units.get(n) == "N·m/rad" or n in ("sigma1", "k")}
     if any(e.verdict == ONLY_REVERSALS for e in estimates):
         out.append(
-            "Log the commanded torque at the drive's own rate, or say what the column holds (--torque-is)."
+            "Log the commanded torque at the drive's own rate, or say what the column holds (--torque-is) and how late "
+            "it acts (--delay)."
         )
     elif stiff:
         out.append(

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from stickslip.binding import NEGATIVE
-from stickslip.errors import InputError, UnknownName
+from stickslip.errors import InputError
 from stickslip.identify.axis.agreed import regressed
-from stickslip.identify.axis.given_timing import against_record
+from stickslip.identify.axis.given_timing import given
 from stickslip.identify.axis.identify import AUTOMATIC, identify_axis
 from stickslip.identify.axis.over_angle import over_angle
 from stickslip.identify.axis.plain import inverse_identification
@@ -23,22 +23,15 @@ from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 
-TAKEN = (
-    "With --delay alone the torque column counts as commanded from its row to the next (--torque-is commanded); say "
-    "what it is if it is another."
-)
-BEHIND = {"commanded": -0.5, "actual": 0.0, "mean": 0.5}
-"""Rows by which a column lies behind the torque: a command acts half a row after its row, on average, and a mean over
-the row before acted half a row before it."""
-
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """The whole axis; the last records judge where some are held out."""
     axis, experiments = experiments_of(records, options)
     count = len(experiments) - options.held_out
-    skew = skew_of(experiments[:count], options)
-    mapped = with_map if options.position_map else identified
-    return with_dead_travel(mapped(axis, experiments, count, skew, options), experiments[:count], axis)
+    skew, said = given(experiments[:count], axis, options.torque_is, options.delay, options.regress)
+    mapped = with_map if options.position_map else by_law
+    found = mapped(axis, experiments, count, skew, options)
+    return with_dead_travel(replace(found, notes=(*said, *found.notes)), experiments[:count], axis)
 
 
 def with_map(
@@ -48,22 +41,10 @@ def with_map(
     try:
         over = over_angle(experiments[:count], axis, skew, options.regress)
     except InputError as error:
-        found = identified(axis, experiments, count, skew, options)
+        found = by_law(axis, experiments, count, skew, options)
         return replace(found, notes=(*found.notes, f"No torque over the angle is identified: {error}."))
     without = [over.taken_out_of(t, axis) for t in experiments]
-    return over.joined_to(identified(axis, without, count, skew, options))
-
-
-def identified(
-    axis: ServoAxis, experiments: Sequence[Experiment], count: int, skew: float | None, options: Options
-) -> Identification:
-    """The axis from the first so many experiments, judged by the rest; and what is to be said of a given timing."""
-    found = by_law(axis, experiments, count, skew, options)
-    if skew is None:
-        return found
-    said = against_record(experiments[:count], axis, skew, options.regress)
-    taken = [TAKEN] if options.torque_is is None else []
-    return replace(found, notes=(*taken, *said, *found.notes))
+    return over.joined_to(by_law(axis, without, count, skew, options))
 
 
 def by_law(
@@ -104,16 +85,6 @@ def refuse_for_every_law(axis: ServoAxis, experiments: Sequence[Experiment], opt
     # One direction's own parameters, and torques over the position, are known where they are searched for.
     plain = [n for n in names if not n.endswith(NEGATIVE) and not n.startswith(("cos", "sin", "friction_"))]
     require_known(plain, known)
-
-
-def skew_of(experiments: Sequence[Experiment], options: Options) -> float | None:
-    """s by which the torque's column lies behind the torque that acted, if the options say so."""
-    if options.torque_is is None and options.delay is None:
-        return None
-    is_what = options.torque_is or "commanded"
-    if is_what not in BEHIND:
-        raise UnknownName("torque_is", is_what, BEHIND)
-    return BEHIND[is_what] * max(t.period for t in experiments) - (options.delay or 0.0)
 
 
 METHOD = Method("axis", "inertia, offset or gravity and friction jointly", identify, driven, holds_out=True)

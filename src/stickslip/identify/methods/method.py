@@ -63,9 +63,9 @@ class Options:
         Channel of a known torque that is added to the recorded one.
     torque_is : {"commanded", "actual", "mean"} or None
         What the torque's column holds: the command from this row to the next, the value at the row, or the mean over
-        the row before; None: found from the record.
+        the row before. Held together with `delay`.
     delay : float or None
-        s from then until it acts.
+        s from then until it acts; None: when it acted is found from the record.
     harmonics : int
         Of a torque over the position (axis).
     position_map : bool
