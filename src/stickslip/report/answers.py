@@ -19,6 +19,7 @@ from stickslip.identify.axis.given_timing import CONTRADICTED
 from stickslip.identify.axis.in_sentences import on_timing
 from stickslip.identify.axis.loop_check import OTHER_LOOP
 from stickslip.identify.axis.problem import mechanics_parameters
+from stickslip.identify.axis.result import perhaps_a_weight
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.monte_carlo import sliding_torque
 from stickslip.identify.motion import speeds_of
@@ -236,6 +237,9 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
     held, own = (found.misfit.get(f"{p}force_relative", math.nan) for p in ("held_out_", ""))
     if held > ELSEWHERE * own:
         out.append(f"on records held out its force error is {percent(held)}, {percent(own)} on those fitted")
+    either, _ = perhaps_a_weight(found.estimates)
+    if either and found["fc"].identified:
+        out.append(either)
     if any(OTHER_LOOP in note for note in found.notes):
         out.append("the record shows another controller than the loop given")
     if any(note.startswith(CONTRADICTED) for note in found.notes):

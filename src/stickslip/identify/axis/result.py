@@ -64,6 +64,7 @@ EXPLAINS_NOTHING = (
 )
 STRIBECK = ("fs", "vs", "delta_s")
 EACH_LEVEL = ("fc", "fc_negative")
+EACH_REST_AND_LEVEL = ("fs", "fs_negative", *EACH_LEVEL)
 UNEVEN = 0.3
 """Part of friction's level by which either direction may differ from it before a constant torque is likelier: on
 another program's axes 24 levels without one were within it and held, 6 that counted one as friction were beyond."""
@@ -226,20 +227,30 @@ def constant_torque_told(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
 
 def apart_from_a_weight(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
     """The estimates, friction's levels refused where they differ by so much that a constant torque is likelier."""
-    level = {e.name: e for e in estimates if e.name in EACH_LEVEL}
-    if len(level) < len(EACH_LEVEL) or any(e.name == "offset" for e in estimates):
+    why, share = perhaps_a_weight(estimates)
+    if share <= UNEVEN:
         return tuple(estimates)
-    forward, backward = (level[n].value for n in EACH_LEVEL)
-    middle, constant = 0.5 * (forward + backward), 0.5 * (forward - backward)
-    if abs(constant) <= UNEVEN * middle:
-        return tuple(estimates)
-    why = PERHAPS_A_WEIGHT.format(
-        forward=forward, backward=backward, middle=middle, constant=constant, unit=level["fc"].unit
-    )
     return tuple(
-        replace(e, identified=False, verdict=why) if e.name in EACH_LEVEL and e.identified else e
+        replace(e, identified=False, verdict=why) if e.name in EACH_REST_AND_LEVEL and e.identified else e
         for e in estimates
     )
+
+
+def perhaps_a_weight(estimates: Sequence[Estimate]) -> tuple[str, float]:
+    """That levels of either direction may hold a constant torque, in words, and its part of their mean; "" and 0 where
+    they differ by no more than their intervals, or a constant torque is among the estimates."""
+    level = {e.name: e for e in estimates if e.name in EACH_LEVEL}
+    if len(level) < len(EACH_LEVEL) or any(e.name == "offset" for e in estimates):
+        return "", 0.0
+    forward, backward = (level[n].value for n in EACH_LEVEL)
+    middle, constant = 0.5 * (forward + backward), 0.5 * (forward - backward)
+    unsure = math.hypot(*(0.5 * (level[n].upper - level[n].lower) for n in EACH_LEVEL))
+    share = abs(constant) / max(middle, 1e-300)
+    if share <= UNEVEN and abs(forward - backward) <= unsure:
+        return "", 0.0
+    return PERHAPS_A_WEIGHT.format(
+        forward=forward, backward=backward, middle=middle, constant=constant, unit=level["fc"].unit
+    ), share
 
 
 def at_level(e: Estimate, level: float) -> Estimate:
