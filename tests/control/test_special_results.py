@@ -15,11 +15,9 @@ import stickslip as ss
 from stickslip.machines.contact import Bearings, Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
-from stickslip.recommend.following import UNLIMITED, follow
+from stickslip.recommend.following import follow
 from stickslip.recommend.plant import laid_out
-from stickslip.rigs.loop_sample import COLUMNS, control_of
-from stickslip.rigs.rig import setpoints
-from stickslip.simulation.machine.layout import look
+from stickslip.simulation.compiled_controller import compiled
 from stickslip.spec import Surroundings
 from support.golden_rows import INERTIA, ROWS
 
@@ -158,16 +156,13 @@ def moving():
 )
 def test_an_hour_at_rest_leaves_what_was_learned(row):
     controller = ROWS[row]
-    control = control_of(controller, UNLIMITED, 1e-3)
+    control, around = compiled(controller), np.array(Surroundings())
     laid = laid_out(ss.RigidAxis(INERTIA, friction()), 1e-3, COUNTS)
-    look(laid, control.measured)
 
     def run(position, velocity):
-        path = setpoints(
-            len(position), position=position, velocity=velocity, acceleration=0.0 * velocity, closed=1.0
-        )
+        path = np.column_stack([position, velocity, 0.0 * velocity])
         positions, push = np.empty(len(path)), np.zeros(len(path))
-        assert follow(laid, control, path, push, np.empty(len(COLUMNS)), positions) == len(path)
+        assert follow(laid, control, path, push, around, positions) == len(path)
         return positions
 
     run(*moving())

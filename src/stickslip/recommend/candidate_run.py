@@ -20,7 +20,7 @@ from stickslip.identify.motion import HOLD, Motion, sinusoid
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.recommend.course import Course, course_of
-from stickslip.recommend.following import followed, setpoints_of, simulated
+from stickslip.recommend.following import followed, simulated
 from stickslip.recommend.plant import Plant
 from stickslip.recommend.swings import above, repeats, reversals, turns
 
@@ -198,16 +198,6 @@ class Drive:
         return self.course.backward(self.reference, self.sample_time)
 
     @cached_property
-    def setpoints(self) -> Array:
-        """`reference` for the closed loop (`stickslip.rigs.rig.Setpoint`)."""
-        return setpoints_of(self.reference)
-
-    @cached_property
-    def setpoints_backward(self) -> Array:
-        """`reference_backward` for the closed loop."""
-        return setpoints_of(self.reference_backward)
-
-    @cached_property
     def stops(self) -> float:
         """How often the motion stops or turns, 1/s."""
         side = np.sign(np.diff(self.reference[:, 0]))
@@ -311,7 +301,7 @@ def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
     """The motion and the rest behind it; the reason where it cannot be run to its end."""
     backward = isinstance(plant, Plant) and plant.backward
     reference = drive.reference_backward if backward else drive.reference
-    position, state = followed(plant, controller, drive.setpoints_backward if backward else drive.setpoints)
+    position, state = followed(plant, controller, reference)
     if position is None:
         return LEFT
     time = controller.sample_time

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
+from stickslip.control.composition import MEMORY
 from stickslip.control.controller import Controller
-from stickslip.jit import kernel
+from stickslip.jit import call_sample, kernel, pointer, record_at
 from stickslip.machines.rigid import RigidAxis
 from stickslip.recommend.plant import laid_out
-from stickslip.rigs.loop_sample import COLUMNS, Control, control_of, decide, finished
-from stickslip.rigs.rig import Limits, setpoints
-from stickslip.simulation.machine.layout import look, stand_at
-from stickslip.simulation.machine.plant import Laid, plant_of
-from stickslip.simulation.machine.step import sample
+from stickslip.simulation.case_arrays import AROUND
+from stickslip.simulation.compiled_controller import Sampled, compiled
+from stickslip.simulation.machine.layout import stand_at
+from stickslip.simulation.machine.plant import CHANNELS, SHOWN, Laid, plant_of
+from stickslip.simulation.machine.step import measure, sample
+from stickslip.spec import Surroundings
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-UNLIMITED = Limits(torque=1e300, speed=1e300)
+OPEN = [f.name for f in MEMORY].index("open")
+"""Place in a controller's memory: it takes over an axis without torque, as on a drive that is switched on."""
 
 
 def simulated(
@@ -26,40 +30,43 @@ def simulated(
 ) -> Array | None:
     """Positions of the axis itself at every sample along a reference, rad; None where it diverges.
 
-    The axis starts at rest at `start`, rad. `push` acts beside the controller's torque, N·m at every sample.
+    The axis starts at rest at `start`, rad. `push` acts beside the controller's torque, N·m at every sample. The
+    reference has a row a sample: position, velocity, acceleration.
     """
-    return followed(plant, controller, setpoints_of(reference), start, push)[0]
-
-
-def setpoints_of(reference: Array) -> Array:
-    """Position, velocity and acceleration of a reference for the closed loop."""
-    q, v, a = reference.T
-    return setpoints(len(reference), position=q, velocity=v, acceleration=a, closed=1.0)
+    return followed(plant, controller, reference, start, push)[0]
 
 
 def followed(
-    plant: RigidAxis, controller: Controller, path: Array, start: float = 0.0, push: Array | None = None
+    plant: RigidAxis, controller: Controller, reference: Array, start: float = 0.0, push: Array | None = None
 ) -> tuple[Array | None, Array]:
-    """As `simulated`, along setpoints, and the state in which it leaves the controller's laws."""
-    control = control_of(controller, UNLIMITED, controller.sample_time)
+    """As `simulated`, and the state in which it leaves the controller's laws."""
+    control = compiled(controller)
+    control.memory[OPEN] = 1.0
     laid = laid_out(plant, controller.sample_time, controller.encoder_counts)
     stand_at(laid, start)
-    look(laid, control.measured)
-    positions = np.empty(len(path))
-    beside = np.zeros(len(path)) if push is None else push
-    done = follow(laid, control, path, beside, np.empty(len(COLUMNS)), positions)
-    ended = done == len(path) and bool(np.all(np.isfinite(positions)))
+    positions = np.empty(len(reference))
+    beside = np.zeros(len(reference)) if push is None else push
+    done = follow(laid, control, np.ascontiguousarray(reference), beside, np.array(Surroundings()), positions)
+    ended = done == len(reference) and bool(np.all(np.isfinite(positions)))
     return positions if ended else None, control.state
 
 
 @kernel()
-def follow(laid: Laid, control: Control, path: Any, push: Any, row: Any, positions: Any) -> int:
-    """The loop of `stickslip.rigs.virtual.run_block`, that keeps the axis's own positions; how many samples ran."""
-    plant = plant_of(laid)
+def follow(laid: Laid, control: Sampled, path: Any, push: Any, around: Any, positions: Any) -> int:
+    """Controller and machine, sample by sample; how many samples ran before one gave no torque."""
+    plant, u = plant_of(laid), record_at(pointer(around, 0), AROUND)
+    seen = np.zeros(len(CHANNELS))
+    shown = record_at(pointer(seen, 0), SHOWN)
+    measure(plant, 0.0, 1.0, shown)
     for k in range(path.shape[0]):
         positions[k] = plant.axis[plant.machine.shaft]
-        torque = decide(control, path[k], row)
-        sample(plant, torque + push[k], control.measured)
-        if finished(control):
-            return k + 1
+        u.temperature, u.time = shown.temperature, shown.time
+        torque = call_sample(
+            control.address, shown.position, path[k, 0], path[k, 1], path[k, 2], pointer(control.settings, 0),
+            pointer(control.memory, 0), pointer(control.state, 0), pointer(control.parameters, 0),
+            pointer(around, 0),
+        )  # fmt: skip
+        if control.memory[control.fault] != 0.0 or not math.isfinite(torque):
+            return k
+        sample(plant, torque + push[k], shown)
     return path.shape[0]
