@@ -104,6 +104,19 @@ def test_a_slope_that_one_band_alone_tells_beside_no_level_is_not_identified(log
     assert judged.verdict == BAND_ALONE
 
 
+@pytest.mark.parametrize("level_alone", [False, True])
+def test_a_slope_is_as_unsure_as_the_level_that_it_is_not_told_apart_from(
+    logs: Any, monkeypatch: pytest.MonkeyPatch, level_alone: bool
+) -> None:
+    """Another program's axis with a spring: the level refused for it, the slope identified, 91 % too high."""
+    found, _ = regressed(logs, 700576, "mean", 1000, "p-pi", "production", "clean")
+    unsure = {"sigma2", "fc"} if level_alone else {"sigma2"}
+    monkeypatch.setattr(Regression, "confirmed", lambda _, name: name not in unsure)
+    both = [estimate(n, found.numbers[n].value, *found.interval(n)) for n in ("fc", "sigma2")]
+    level, slope = told_apart(both, found, COULOMB)
+    assert level.identified is slope.identified is not level_alone
+
+
 def test_static_friction_is_no_better_known_than_the_velocity_of_its_fall() -> None:
     rest, fall = estimate("fs", 0.3, 0.29, 0.31), estimate("vs", 0.1, 0.09, 0.11)
     assert with_rest([rest, fall]) == (rest, fall)

@@ -239,7 +239,7 @@ def of_sliding(
 
 
 def told_apart(
-    estimates: Iterable[Estimate], found: Regression, model: Model, inverse: InverseDynamics | None = None
+    estimates: Sequence[Estimate], found: Regression, model: Model, inverse: InverseDynamics | None = None
 ) -> tuple[Estimate, ...]:
     """The estimates, inertia, level and slope of friction not identified where certain sliding does not tell them
     apart; values stay.
@@ -258,6 +258,13 @@ def told_apart(
         "inertia": True, "fc": of_law and high <= RATIO * low, "sigma2": of_law and found.slope_told,
     }  # fmt: skip
 
+    def alone(e: Estimate) -> bool:
+        name = e.name.removesuffix(NEGATIVE)
+        return clear.get(name, False) and not found.confirmed(name) and not seconded(e, found, inverse)
+
+    # A level that is not told apart from its slope leaves the slope as unsure.
+    level_alone = any(alone(e) for e in estimates if e.name.removesuffix(NEGATIVE) == "fc")
+
     def doubt_on(e: Estimate) -> str:
         name = e.name.removesuffix(NEGATIVE)
         if found.creep.steady and name in ("fc", "sigma2"):
@@ -268,8 +275,7 @@ def told_apart(
             return LATE_FALL
         if bend and of_law and name in LEVELS:
             return BENT.format(how="faster" if bend > 0.0 else "more slowly", share=min(abs(bend), 1.0))
-        alone = clear.get(name) and not found.confirmed(name) and not seconded(e, found, inverse)
-        if alone and (name != "sigma2" or found.rough or high > ALONE * low):
+        if alone(e) and (name != "sigma2" or level_alone or found.rough or high > ALONE * low):
             return BAND_ALONE
         if name != "fc" or not clear["fc"]:
             return ""
