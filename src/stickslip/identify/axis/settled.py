@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.identify.axis.above_nothing import above_nothing, likely
 from stickslip.identify.axis.gravity import hanging, of_one_weight
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.bounded import within_bounds
@@ -253,7 +254,7 @@ def settled(
         shared, less = own.solved({**chosen, **both}, free, level)
         if less < error:
             chosen, error = shared, less
-    asked, notes = set[str](), list[str]()
+    asked, notes, moves, before = set[str](), list[str](), "", error
     if held and error > FOLLOWED * inverse.relative_error:
         if refuted_by is None:
             moved, less, where = own.moved(chosen, free, held, level)
@@ -262,9 +263,12 @@ def settled(
             (moved, less), where = followed or (chosen, error), "within"
             notes = [] if followed else [KEPT]
         if less < error:
-            said = BEST_WITHIN.format(where=where, less=100.0 * less, before=100.0 * error)
-            notes = [said] if less < WORTH_A_WORD * error else []
-            chosen, error, asked = moved, less, set(held)
+            chosen, error, asked, moves, notes = moved, less, set(held), where, []
+    chosen, error = above_nothing(
+        (chosen, error), likely(estimates), free, lambda start, bounds: own.solved(start, bounds, level), 1.0
+    )
+    if moves and error < WORTH_A_WORD * before:
+        notes = [BEST_WITHIN.format(where=moves, less=100.0 * error, before=100.0 * before)]
     notes += made_by_a_controller(inverse, error)
     friction = chosen["fc"]
     if not by_name["fc"].identified:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.binding import NEGATIVE
+from stickslip.identify.axis.above_nothing import above_nothing, likely
 from stickslip.identify.axis.gravity import hanging, of_one_weight
 from stickslip.identify.axis.settled import GRAVITY, PREFERRED, TURNS, Settling, physical, turned
 from stickslip.identify.estimate import Estimate
@@ -114,12 +115,17 @@ def settled_each_way(
     for e in (e for e in rests if e.identified and level_of(e.name) in free):
         free[level_of(e.name)] = (0.0, e.value)
     loose = [e.name for e in rests if not e.identified]
-    chosen, left = dict(values), math.inf
+    chosen, left, level = dict(values), math.inf, list[str]()
     for falling in fewest_first([] if falls else loose):
         flat = [n for n in loose if not falls and n not in falling]
         found, rest = own.explained(values, free, flat, [n for n in loose if n not in flat])
         if left == math.inf or rest <= PREFERRED * left:
-            chosen, left = found, rest
+            chosen, left, level = found, rest, flat
+    torque = float(np.sqrt(np.mean(inverse.torque**2)))
+    chosen, _ = above_nothing(
+        (chosen, left), likely(estimates), free,
+        lambda start, bounds: own.explained(start, bounds, level, [n for n in loose if n not in level]), torque,
+    )  # fmt: skip
     if refused(model, chosen):
         return tuple(estimates)
     if "gravity_sin" in chosen and not by_name["gravity"].identified:
