@@ -69,6 +69,17 @@ def test_orders_of_both_parts_and_the_axis_without_them() -> None:
     assert found.misfit["inverse_dynamics_relative"] < 0.3 * plain.misfit["inverse_dynamics_relative"]
 
 
+def test_the_error_without_a_map_is_no_more_than_the_torque_over_the_angle() -> None:
+    """Sectors that hold what no other does (here the ends of the strokes) extrapolate inertia and friction."""
+    found = ss.identify(record(swing=2.8), position_map=True, inverse=True)
+    beside = np.sqrt(sum(0.5 * size**2 for size, _ in COGGING.values()))
+    for kind in ("sectors", "places"):
+        assert found.misfit[f"no_map_{kind}_left_out_Nm"] == pytest.approx(beside, rel=0.1)
+        assert found.misfit[f"map_{kind}_left_out_Nm"] < 0.1 * beside
+    (note,) = (n for n in found.notes if n.startswith("Torque over the angle:"))
+    assert f"(no map {found.misfit['no_map_sectors_left_out_Nm']:.3g})" in note
+
+
 def test_long_strokes_at_constant_speeds_show_high_orders() -> None:
     """Their rows show no swing of the velocity at these orders: no column for it, where two of zeros ended the fit."""
     t = np.arange(0.0, 24.0, 1e-3)

@@ -18,7 +18,14 @@ from stickslip.errors import InputError
 from stickslip.identify.axis.result import speed_of
 from stickslip.identify.cogging import angle_of, chosen_terms, map_of
 from stickslip.identify.cogging.fitting import Fit
-from stickslip.identify.cogging.orders import HIGHEST, Orders, columns, moving_columns
+from stickslip.identify.cogging.orders import (
+    HIGHEST,
+    Orders,
+    about_motion,
+    columns,
+    moving_columns,
+    sectors,
+)
 from stickslip.identify.cogging.remarks import Lag, eccentricities, lag_of
 from stickslip.identify.cogging.result import ROUND, Choice, estimates_of, pictures_of, remarks_of
 from stickslip.identify.cogging.rows import Places
@@ -143,6 +150,8 @@ def over_angle(
     orders = orders_of(places)
     moving = moving_columns(places)
     found, choice, terms = chosen_terms(places, orders, moving)
+    without, with_map = about_motion(places, orders, moving, sectors, len(terms))
+    choice = replace(choice, nothing=(choice.nothing[0], without), harmonics=(choice.harmonics[0], with_map))
     lag, eccentric = lag_of(found), eccentricities(found)
     estimates = [
         e for e in estimates_of(found, "N·m", lag, eccentric)
@@ -158,9 +167,9 @@ def over_angle(
     even = sum(part == "even" for part, _ in terms)
     notes = (
         f"Torque over the angle: {even} orders in both directions alike, {len(terms) - even} with the direction, "
-        f"chosen by the error on sectors left out whole: {choice.harmonics[1]:.3g} N·m RMS (no map "
-        f"{choice.nothing[1]:.3g}). All other numbers, errors and pictures of the axis are those of the "
-        "torque without this map.",
+        "chosen by the error on sectors left out whole; about inertia and friction of all the rows it is "
+        f"{choice.harmonics[1]:.3g} N·m RMS there (no map {choice.nothing[1]:.3g}). All other numbers, errors and "
+        "pictures of the axis are those of the torque without this map.",
         *remarks_of(found, orders, lag, eccentric),
     )
     pictures = pictures_of(without_motion(places, found, moving), found, the_map)

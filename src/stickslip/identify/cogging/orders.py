@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from stickslip.identify.cogging.noise import memory
-from stickslip.identify.cogging.rows import Places
+from stickslip.identify.cogging.rows import Places, least_squares
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Integers = np.ndarray[Any, np.dtype[np.intp]]
@@ -208,6 +208,28 @@ def growing(fitted: Places, out: Places, terms: Sequence[Term], moving: Sequence
         values = np.linalg.solve(r[:m, :m], seen[:m])
         found.append(float(np.sum((out.torque - other[:, :m] @ values) ** 2)))
     return np.array(found)
+
+
+def about_motion(
+    places: Places, orders: Orders, moving: Sequence[str], fold: Fold, count: int
+) -> tuple[float, float]:
+    """RMS on what was left out without waves, and with the first `count` terms that each fold shows.
+
+    What the motion carries is fitted to all places: the others alone extrapolate it, and of records in motion what
+    follows a reversal or an acceleration in a sector that was left out may be seen there only.
+    """
+    number, torque, beside = fold(places), places.torque, places.beside.shape[1]
+    basis, _ = np.linalg.qr(columns(places, (), moving))
+    squares = np.zeros(len(places))
+    for f in range(int(number.max()) + 1):
+        fitted = places.at(number != f)
+        terms = path(fitted, orders, moving, most=count)
+        pairs = least_squares(columns(fitted, terms, moving), fitted.torque)[2 + len(moving) + beside :]
+        left = torque - columns(places, terms, ())[:, 2 + beside :] @ pairs
+        left = left - basis @ (basis.T @ left)
+        squares[number == f] = left[number == f] ** 2
+    without = torque - basis @ (basis.T @ torque)
+    return float(np.sqrt(np.mean(without**2))), float(np.sqrt(np.mean(squares)))
 
 
 def chosen(errors: Array) -> int:
