@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,13 @@ os.environ["STICKSLIP_CONFIG"] = tempfile.mkdtemp(prefix="stickslip-tests-")
 # processor's time, and the commands do without as well. Before NumPy is imported, which reads it.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+# A job in the background is born deaf to Ctrl-C and nohup's to the end of its terminal: tests that send these to
+# themselves or to what they start would wait for a minute each.
+for _signal, _usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGQUIT, signal.SIG_DFL),
+                        (signal.SIGHUP, signal.SIG_DFL)):  # fmt: skip
+    if signal.getsignal(_signal) is signal.SIG_IGN:
+        signal.signal(_signal, _usual)
 
 _MADE = [os.environ["STICKSLIP_CONFIG"]]
 
