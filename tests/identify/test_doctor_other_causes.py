@@ -59,6 +59,28 @@ def test_a_bend_over_a_twelfth_of_a_turn_is_no_gravity(swing, weighs):
         assert float(said[0].split("angle: ")[1].split()[0]) == pytest.approx(0.4, rel=0.1)
 
 
+@pytest.mark.parametrize("weight", [0.0, 0.4])
+@pytest.mark.parametrize("way", [0.02, 0.05])
+def test_friction_that_builds_up_behind_a_reversal_is_no_gravity(way: float, weight: float) -> None:
+    """A slow sine of another program over 57 degrees, LuGre friction of 1.5 N·m: "0.547 N·m once a turn, as gravity
+    does"; play and a spring at the load made it as well."""
+    t = np.arange(0.0, 20.0, 4e-3)
+    sine = np.sin(2.0 * np.pi * 0.2 * t)
+    q = np.cumsum(np.sign(sine) * np.maximum(np.abs(sine) - 0.3, 0.0))
+    q = q / np.ptp(q) + weight * np.sin(2.0 * np.pi * 0.7 * t)
+    friction, bristle = np.zeros(t.size), 0.0
+    for k, step in enumerate(np.diff(q, prepend=q[0]).tolist()):
+        bristle += step - abs(step) * bristle / way
+        friction[k] = 0.3 * bristle / way
+    torque = 1e-3 * np.gradient(np.gradient(q, t), t) + friction + weight * np.sin(q)
+    torque += 1e-3 * np.random.default_rng(3).standard_normal(t.size)
+    record = Record(t, {"position": q, "motor_torque": torque}, UNITS)
+    told = [f.message for f in examine(record).findings if f.code == "gravity"]
+    assert len(told) == int(weight > 0.0)
+    if told:
+        assert float(told[0].split("angle: ")[1].split()[0]) == pytest.approx(weight, rel=0.25)
+
+
 def moved(weight: float, *, magnitude: bool) -> Record:
     t = np.arange(0.0, 4.0, 1e-3)
     q = 8.0 * np.sin(2.0 * np.pi * 0.5 * t)

@@ -85,6 +85,19 @@ def test_a_torque_of_another_clock_is_told_with_its_interval(base, rows):
     assert said[3] == ("torque" if rows > 0 else "motion")
 
 
+def test_an_axis_that_stands_at_its_reversals_turns_its_torque_late():
+    """Another program's slow sine, which sticks for 0.2 s at every end: "shifted by 26 ms", where it was 0.4 ms."""
+    t, stroke, wait, builds_up = np.arange(0.0, 10.0, 1e-3), 1.5, 0.1, 0.056
+    after = t % (stroke + wait)
+    side = np.where(t // (stroke + wait) % 2.0, -1.0, 1.0)
+    v = 0.2 * side * np.sin(np.pi * np.minimum(after / stroke, 1.0))
+    turned = (t - stroke) / (stroke + wait)
+    ramp = np.clip(2.0 * (turned % 1.0) * (stroke + wait) / (wait + builds_up) - 1.0, -1.0, 1.0)
+    torque = 0.07 * np.where(np.floor(turned) % 2.0, 1.0, -1.0) * ramp + 5e-4 * rng().standard_normal(t.size)
+    record = Record(t, {"position": np.cumsum(v) * 1e-3, "motor_torque": torque}, UNITS)
+    assert "time-skew" not in {f.code for f in examine(record).findings}
+
+
 def test_reversals_that_friction_rounds_tell_no_delay():
     """Most of the torque is friction without a sharp edge: logs of that kind whose torque is in time look alike."""
     table = made("turned")

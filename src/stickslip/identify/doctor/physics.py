@@ -186,9 +186,11 @@ def _skew_at_reversals(smooth: Smooth) -> float | None:
     least = max(CLEARLY * float(rests[best]), HARM * float(np.var(smooth.torque)))
     if abs(shifts[best]) < MANY or best in (0, shifts.size - 1) or rests[shifts == 0][0] < least:
         return None
-    late = float(shifts[best]) * smooth.period
-    far = abs(late) > EARLY
-    return None if far and not _is_far(smooth, int(shifts[best]), float(rests[best]), reach) else late
+    shift, rest = int(shifts[best]), float(rests[best])
+    # While it stands its torque turns unseen: of a shift within that, only what accelerates the axis tells.
+    unseen = abs(shift) < smooth.standstill and not _accelerates(smooth, shift, rest, reach)
+    late = shift * smooth.period
+    return None if unseen or (abs(late) > EARLY and not _is_far(smooth, shift, rest, reach)) else late
 
 
 def _is_far(smooth: Smooth, shift: int, rest: float, reach: int) -> bool:
@@ -198,7 +200,12 @@ def _is_far(smooth: Smooth, shift: int, rest: float, reach: int) -> bool:
     # A shake fits itself some periods later.
     if BETTER * rest > least_between(*shorter):
         return False
-    # Where the axis dwells at every reversal its torque turns late, too; what accelerates it does not.
+    return _accelerates(smooth, shift, rest, reach)
+
+
+def _accelerates(smooth: Smooth, shift: int, rest: float, reach: int) -> bool:
+    """Whether a shift that leaves `rest` shows an inertia: where the axis dwells at every reversal its torque turns
+    late, too; what accelerates it does not."""
     return bool(_rests(smooth, [shift], reach, accelerates=False)[0] >= SHOWS * rest)
 
 
@@ -245,13 +252,25 @@ def _once_a_turn(smooth: Smooth, plain: Fit, turns: float) -> tuple[float, float
     if not np.ptp(smooth.position) > 0.5 * turns or size == 0.0:
         return 0.0, plain.rest
     full = _fit(smooth, 0, periodic=True, turn=turns * math.tau)
-    amplitude = math.hypot(full.values[4], full.values[5])
-    angle = smooth.position[_rows(smooth)] / turns
+    rows = _rows(smooth)
+    shows = full.explained > 0.5 and _shows_turn(smooth, rows, plain, full, turns)
+    # Friction that builds up behind a reversal makes the mean of both directions rise over a short way, too: a weight
+    # acts where that is over.
+    beyond = rows[smooth.gone_on[rows]]
+    if shows and beyond.size >= FEWEST and np.ptp(smooth.position) < turns * math.tau:
+        line, wave = (_fit(smooth, 0, periodic=p, turn=turns * math.tau, rows=beyond) for p in (False, True))
+        shows = _shows_turn(smooth, beyond, line, wave, turns)
+    return (math.hypot(full.values[4], full.values[5]) if shows else 0.0), full.rest
+
+
+def _shows_turn(smooth: Smooth, rows: Any, plain: Fit, full: Fit, turns: float) -> bool:
+    """Whether a torque once in so many turns explains what a line leaves in some rows, and these show much of it."""
+    size, amplitude = float(np.std(smooth.torque)), math.hypot(full.values[4], full.values[5])
+    angle = smooth.position[rows] / turns
     # Of a short part of a turn any bend of the torque makes a wave, with the constant torque against it.
     seen = 0.5 * float(np.ptp(full.values[4] * np.sin(angle) + full.values[5] * np.cos(angle)))
-    shows = full.rest < 0.7 * plain.rest and 0.1 * size < amplitude < 20.0 * size and full.explained > 0.5
-    shows = shows and seen > max(0.1 * size, amplitude / EXTRAPOLATED)
-    return (amplitude if shows else 0.0), full.rest
+    shows = full.rest < 0.7 * plain.rest and 0.1 * size < amplitude < 20.0 * size
+    return shows and seen > max(0.1 * size, amplitude / EXTRAPOLATED)
 
 
 def _offset(view: View, smooth: Smooth, plain: Fit) -> Iterator[Finding]:
@@ -324,11 +343,12 @@ def _degrees_or_gear(view: View, smooth: Smooth) -> Finding:
 
 
 def _fit(
-    smooth: Smooth, shift: int, *, periodic: bool = False, measured: bool = False, turn: float = 2.0 * math.pi
-) -> Fit:
-    """Least squares over the rows that move, with the torque taken `shift` samples later; `turn` is one of the position
-    in its unit."""
-    rows = _rows(smooth)
+    smooth: Smooth, shift: int, *, periodic: bool = False, measured: bool = False, turn: float = 2.0 * math.pi,
+    rows: Any = None,
+) -> Fit:  # fmt: skip
+    """Least squares over the rows that move, or some of them, with the torque taken `shift` samples later; `turn` is
+    one of the position in its unit."""
+    rows = _rows(smooth) if rows is None else rows
     matrix = _matrix(smooth, rows, measured=measured)
     if periodic:
         angle = 2.0 * math.pi / turn * smooth.position[rows]

@@ -23,6 +23,9 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 MAIN = ("position", "velocity", "motor_torque", "friction_torque", "current")
+BUILDS_UP = 0.3
+"""Of a stroke, behind its reversal, in which friction may build up: pre-sliding, play, a load that is wound up. In
+three slow sines it was a tenth; behind it what a torque once a turn explained was a thousandth of what it had been."""
 MAX_ROWS = 200_000
 """Rows of the even grid: longer records are looked at more coarsely."""
 
@@ -66,6 +69,24 @@ class Smooth:
     def moving(self) -> Mask:
         """Where the axis moves, mask: faster than a twentieth of `fast`."""
         return np.asarray(np.abs(self.velocity) > 0.05 * self.fast)
+
+    @cached_property
+    def standstill(self) -> float:
+        """Rows that the axis usually does not move for, before it moves again; 0 where it always does."""
+        turns = np.flatnonzero(np.diff(self.moving))
+        stops = turns[np.argmax(self.moving[turns]) :] if turns.size else turns
+        return float(np.median(np.diff(stops)[::2])) if stops.size > 1 else 0.0
+
+    @cached_property
+    def gone_on(self) -> Mask:
+        """Where the axis has gone `BUILDS_UP` of its stroke since it turned, mask."""
+        first = np.flatnonzero(np.diff(np.sign(self.velocity), prepend=0.0) != 0.0)
+        last = np.append(first[1:], self.velocity.size) - 1
+        stroke = np.repeat(np.arange(first.size), last - first + 1)
+        start, end = self.position[first], self.position[last]
+        gone = np.abs(self.position[-stroke.size :] - start[stroke])
+        after = np.asarray(gone > BUILDS_UP * np.abs(end - start)[stroke])
+        return np.concatenate([np.zeros(self.velocity.size - after.size, dtype=np.bool_), after])
 
 
 def is_number(values: Array) -> Mask:
