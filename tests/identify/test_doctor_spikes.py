@@ -119,6 +119,23 @@ def test_a_peak_of_torque_that_the_axis_follows_is_no_spike(late: int):
     assert np.array_equal(spike_rows(Record(t, by_velocity, units)), [101, 718, 719, 1235, 1889])
 
 
+def test_a_kick_that_starts_or_stops_a_jog_is_no_spike() -> None:
+    """Of another program's jogs those were spikes at which the torque beside them changes most."""
+    jog = np.concatenate([np.zeros(100), np.full(100, 4.0), np.zeros(100), np.full(100, -4.0)])
+    v = np.concatenate([np.tile(jog, 4), np.zeros(50)])
+    friction = 0.04 * np.sign(v)
+    # While it stands, half of friction is held, and the loop's integral part builds up to break loose.
+    for first in range(0, v.size, 200):
+        last = min(first + 100, v.size - 1)
+        friction[first:last] = np.linspace(
+            0.5 * friction[first - 1] if first else 0.0, friction[last], last - first
+        )
+    torque = friction + 0.05 / 4.0 * np.diff(v, prepend=0.0)
+    torque += 1e-4 * np.random.default_rng(0).standard_normal(v.size)
+    channels = {"position": np.cumsum(v) * 4e-3, "motor_torque": torque}
+    assert "spikes" not in codes(Record(4e-3 * np.arange(v.size), channels, UNITS))
+
+
 def test_a_torque_that_stays_where_it_jumps_is_no_spike():
     t, q, _ = motion()
     # Break-away of an axis that sticks: one row above, then another level.

@@ -157,9 +157,19 @@ def _moving(view: View, torque: Array, first: Any, last: Any, sign: Array) -> An
     late: Array = np.stack([_kick(position, first + k, last + k, sign) for k in shifts]).max(axis=0)
     kick, seen = _kick(position, first, last) * sign, late > usually
     if seen.size >= SEVERAL and float(np.mean(seen)) >= MOST:
-        # They tell the inertia that they move themselves.
-        return seen & (late / given >= SHARE * float(np.median(late[seen] / given[seen])))
+        # They tell the inertia that they move themselves: by what each adds to the torque beside it, since that may
+        # change across it as well, where the axis breaks loose.
+        added = _impulse(torque, first, last)
+        return seen & (late / added >= SHARE * float(np.median(late[seen] / added[seen])))
     return (kick > usually) & (inertia * kick >= SHARE * given)
+
+
+def _impulse(torque: Array, first: Any, last: Any) -> Array:
+    """What runs of rows add to the mean of the rows beside each, summed up."""
+    beside = np.clip(np.stack([first - 1, last + 1]), 0, torque.size - 1)
+    total = np.concatenate([[0.0], np.cumsum(torque)])
+    added = total[last + 1] - total[first] - (last + 1 - first) * np.mean(torque[beside], axis=0)
+    return np.maximum(np.abs(added), 1e-300)
 
 
 def _kick(position: Array, first: Any, last: Any, sign: Any = 0.0) -> Array:
