@@ -11,14 +11,15 @@ import pytest
 
 from stickslip.identify.axis.agreed import told_apart
 from stickslip.identify.axis.identify import identify_axis
-from stickslip.identify.axis.in_sentences import on_bend, on_swing, on_width
+from stickslip.identify.axis.in_sentences import on_bend, on_creep, on_swing, on_width
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.smooth import Window, seen
+from stickslip.identify.regression.creeping import Creep
 from stickslip.identify.regression.flexible import Swing, swings_alike, two_inertias
 from stickslip.identify.regression.number import Number
 from stickslip.identify.regression.regression import Regression, regress_axis
-from stickslip.identify.regression.together import bend_of
+from stickslip.identify.regression.together import bend_of, bends_by_itself
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from support.belt import LOAD, MOTOR, coulomb, driven
@@ -83,6 +84,7 @@ def test_friction_that_rises_in_another_form_identifies_no_level_and_slope(
     log = rigid(friction)
     found = regress_axis([log], AXIS)
     assert sign * bend_of(found.bands) > 0.0
+    assert bends_by_itself(found.bands)
     (sentence,) = on_bend(found)
     assert said in sentence
     low, high = found.interval("inertia")
@@ -140,6 +142,37 @@ def test_friction_with_a_level_and_a_slope_does_not_bend() -> None:
     found = regress_axis([rigid(coulomb)], AXIS)
     assert bend_of(found.bands) == 0.0
     assert on_bend(found) == on_swing(found) == []
+
+
+def test_a_bend_that_a_swing_explains_is_not_called_frictions() -> None:
+    """Six logs of another program's jogs, of loads behind springs, told "a lubricant that thins"."""
+    found = regress_axis([rigid(coulomb)], AXIS)
+    bent = replace(found, bands=tuple(replace(b, bend=-0.2) for b in found.bands))
+    assert bends_by_itself(bent.bands)
+    (said,) = on_bend(bent)
+    assert "lubricant" in said
+    either = (
+        tuple(replace(b, swing_bends=True) for b in bent.bands),
+        tuple(replace(b, numbers=b.numbers | {"inertia": Number(0.0, MOTOR)}) for b in bent.bands),
+    )
+    for bands in either:
+        assert not bends_by_itself(bands)
+        (said,) = on_bend(replace(bent, bands=bands))
+        assert "lubricant" not in said
+        assert "does not tell which" in said
+        doubts = verdicts(replace(bent, bands=bands))
+        assert all("does not tell which" in doubts[n] for n in ("fc", "sigma2"))
+
+
+def test_what_a_load_that_swings_takes_from_the_torque_is_no_play() -> None:
+    """Six logs of another program's motors and loads: 20 to 89 % of friction's level was missing, "a motor that goes on
+    alone within the play"."""
+    creep = Creep(3.0, 0.4)
+    for frequency, play in ((160.0, True), (16.0, False)):
+        found = replace(regress_axis([driven(frequency, coulomb)], AXIS), creep=creep)
+        (said,) = on_creep(found, AXIS)
+        assert ("play" in said) is play
+        assert ("load that swings" in said) is not play
 
 
 def test_a_bend_is_what_two_bands_show() -> None:

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.identify.axis.agreed import BAND_ALONE, plain_value, told_apart
+from stickslip.identify.axis.agreed import BAND_ALONE, told_apart
 from stickslip.identify.axis.falling import AT_REST, NO_LEVEL, widened, with_level, with_rest
 from stickslip.identify.axis.identify import identify_axis
+from stickslip.identify.axis.plain_numbers import plain_value
 from stickslip.identify.axis.result import HELD_BY_FRICTION, constant_torque_told
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment

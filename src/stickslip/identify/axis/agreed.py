@@ -27,6 +27,7 @@ from stickslip.identify.axis.falling import (
 )
 from stickslip.identify.axis.form import told_with
 from stickslip.identify.axis.gravity import hanging
+from stickslip.identify.axis.plain_numbers import plain_each_way, plain_value
 from stickslip.identify.axis.settled import ALONE, APART, TWO_METHODS
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
@@ -38,7 +39,7 @@ from stickslip.identify.regression.reasons import DROWNED
 from stickslip.identify.regression.regression import QUANTILE, Regression, regress_axis
 from stickslip.identify.regression.regressions import Regress
 from stickslip.identify.regression.strokes import stacked
-from stickslip.identify.regression.together import bend_of
+from stickslip.identify.regression.together import bend_of, bends_by_itself
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 
@@ -64,6 +65,10 @@ OTHER_FORM = "slower steady motion has another friction than this level and slop
 BENT = (
     "friction rises ever {how} with velocity: over the recorded speeds its curve is {share:.0%} of Fc off any "
     "level, slope and fall"
+)
+OR_SWINGS = (
+    "the torque bends with velocity by {share:.0%} of Fc, as friction of another form or a load that swings bends it: "
+    "this record does not tell which"
 )
 LEVELS = ("fc", "sigma2", *FALL)
 """What sliding alone tells of friction; that of v < 0 too where it has parameters of its own."""
@@ -274,7 +279,8 @@ def told_apart(
         if of_law and found.shows_a_fall and falls_late(name, found.vs, found.fastest):
             return LATE_FALL
         if bend and of_law and name in LEVELS:
-            return BENT.format(how="faster" if bend > 0.0 else "more slowly", share=min(abs(bend), 1.0))
+            said = BENT if bends_by_itself(found.bands) else OR_SWINGS
+            return said.format(how="faster" if bend > 0.0 else "more slowly", share=min(abs(bend), 1.0))
         if alone(e) and (name != "sigma2" or level_alone or found.rough or high > ALONE * low):
             return BAND_ALONE
         if name != "fc" or not clear["fc"]:
@@ -295,28 +301,6 @@ def seconded(e: Estimate, found: Regression, inverse: InverseDynamics | None) ->
         return False
     plain = plain_each_way(e.name, inverse) if found.each_way else plain_value(e.name, inverse)
     return plain is not None and e.lower <= plain[0] <= e.upper and plain[1] <= 0.5 * (e.upper - e.lower)
-
-
-PLAIN = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}
-"""Names of the plain inverse dynamics."""
-
-
-def plain_value(name: str, inverse: InverseDynamics | None) -> tuple[float, float] | None:
-    """Value and half-width of the plain inverse dynamics, where it has that number."""
-    own = PLAIN.get(name, "")
-    if inverse is None or not inverse.has(own):
-        return None
-    return inverse[own], QUANTILE * float(inverse.robust_std[inverse.names.index(own)])
-
-
-def plain_each_way(name: str, inverse: InverseDynamics | None) -> tuple[float, float] | None:
-    """The same where friction has parameters of its own in each direction, of which the plain inverse dynamics tells
-    inertia and levels: those are Coulomb's torque with the constant one and without it."""
-    level, constant = (plain_value(n, inverse) for n in ("fc", "offset"))
-    if not name.startswith("fc") or level is None or constant is None:
-        return plain_value(name, inverse) if name == "inertia" else None
-    side = -1.0 if name.endswith(NEGATIVE) else 1.0
-    return level[0] + side * constant[0], math.hypot(level[1], constant[1])
 
 
 def held_against(estimates: Iterable[Estimate], inverse: InverseDynamics) -> tuple[Estimate, ...]:

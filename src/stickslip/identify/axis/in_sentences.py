@@ -8,7 +8,7 @@ import statistics
 from stickslip.identify.axis.agreed import ALIGNED, KNOWN
 from stickslip.identify.regression.flexible import moves_a_load
 from stickslip.identify.regression.regression import Regression
-from stickslip.identify.regression.together import bend_of
+from stickslip.identify.regression.together import bend_of, bends_by_itself
 from stickslip.machines.servo import ServoAxis
 
 AS_ONE = 4.0
@@ -100,6 +100,12 @@ def on_creep(found: Regression | None, axis: ServoAxis) -> list[str]:
             f"Slower than {speed} {missing} of friction's level is missing although the axis slides steadily: friction "
             f"rises with velocity in another form than a level and a slope, which are those of faster motion alone."
         ]
+    # While its load swings the motor slows down and speeds up, and what the spring gives it there is no play's.
+    if moves_a_load([b.swing for b in found.bands]):
+        return [
+            f"Slower than {speed} the torque is less than friction's level, by {missing} of it, as the spring of a "
+            "load that swings makes it: these rows are left out, inertia and friction are those of faster motion."
+        ]
     return [
         f"Slower than {speed} {missing} of friction's level is missing (a motor that goes on alone within the play, or "
         f"friction that builds up with velocity): inertia and friction are those of faster motion."
@@ -110,8 +116,15 @@ def on_bend(found: Regression | None) -> list[str]:
     """That friction rises with velocity in another form than a level and a slope, in a sentence; nothing where it does
     not."""
     bend = 0.0 if found is None else bend_of(found.bands)
-    if bend == 0.0:
+    if found is None or bend == 0.0:
         return []
+    if not bends_by_itself(found.bands):
+        return [
+            f"The torque bends with velocity, by {min(abs(bend), 1.0):.0%} of Fc over the recorded speeds, as friction "
+            "of another form bends it, a load that swings behind a spring, or an inertia that does not show; this "
+            "record does not tell which, and level and slope hold there alone. Constant speeds, with gentle ramps "
+            "between them, would tell."
+        ]
     how, why = (
         ("faster", "drag with the square of the speed, a motor whose torque constant falls with the current")
         if bend > 0.0 else ("more slowly", "a lubricant that thins")

@@ -26,7 +26,7 @@ from stickslip.identify.regression.band_system import (
     Candidate,
     System,
 )
-from stickslip.identify.regression.bent import bent_in, explains
+from stickslip.identify.regression.bent import bent_in, explains, swing_explains
 from stickslip.identify.regression.drifting import drift_rows
 from stickslip.identify.regression.flexible import Swing, Train, flexible_columns
 from stickslip.identify.regression.number import QUANTILE, Number
@@ -83,6 +83,8 @@ class BandFit:
         What the second derivatives of acceleration, and where a load swings of torque, say.
     bend : float
         Part of Fc by which friction rises with velocity in another form (`stickslip.identify.regression.bent`).
+    swing_bends : bool
+        Whether a load that swings may be what bends the torque so.
     flexible : float
         Part of the misfit that a train which gives or swings would leave at least; 1 where it does already.
     """
@@ -100,6 +102,7 @@ class BandFit:
     pieces: int
     swing: Swing
     bend: float
+    swing_bends: bool
     flexible: float
 
 
@@ -299,6 +302,8 @@ def summed_up(
                           for i in range(first, core)]).reshape(orders, 2)  # fmt: skip
     misfit = float(np.sqrt(np.mean(residual**2)))
     bend, bent = bent_in(system, candidates, weight)
+    flexible = left_flexible(system, torque, best)
+    swing_bends = bent is not None and swing_explains(system, bent, best, flexible)
     if bent is not None and explains(system, bent, best):
         # What friction rises by passes for inertia where the axis accelerates at speed: that of either form may be it.
         own, other = numbers["inertia"], float(bent.values[INERTIA] / system.scale[INERTIA])
@@ -313,7 +318,7 @@ def summed_up(
         system.records[0].window.corner, numbers, float(falls / total), weight,
         tuple(tried[k] for k in system.levels), harmonics, correlation, misfit,
         misfit / max(float(np.sqrt(np.mean(torque**2))), 1e-300), torque.size, int(system.piece[-1]) + 1,
-        system.swing_of(best), bend, left_flexible(system, torque, best),
+        system.swing_of(best), bend, swing_bends, flexible,
     )  # fmt: skip
 
 

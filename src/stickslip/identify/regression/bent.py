@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.regression.band_system import COULOMB, RISE, VISCOUS, Candidate, System
+from stickslip.identify.regression.flexible import Train
 from stickslip.identify.regression.sliding_rows import DIRECTION
 from stickslip.identify.regression.strokes import stacked
 
@@ -57,6 +58,24 @@ def explains(system: System, bent: Candidate, best: Candidate) -> bool:
     beside it. What a train that rings leaves is another thing."""
     left = bent.cost / system.columns.shape[0]
     return bent.cost < LESS**2 * best.cost and left < (LEFT * system.fc) ** 2
+
+
+def swing_explains(system: System, bent: Candidate, best: Candidate, flexible: float) -> bool:
+    """Whether a load that swings may be what bends the torque: a train that does is taken already, or would leave no
+    more than the other form does; unless that form explains most of what is left, as no swing's part of it would.
+
+    After a jog the load swings while the motor slows down, so that what it gives and takes goes with the speed.
+
+    Parameters
+    ----------
+    system : System
+    bent, best : Candidate
+        The other form, and the likeliest level, slope and fall.
+    flexible : float
+        Part of the misfit of `best` that a train which swings would leave at least.
+    """
+    swings = system.train is not Train.RIGID or flexible**2 * best.cost <= bent.cost
+    return swings and bent.cost >= LESS**2 * best.cost
 
 
 def fall_in(system: System, c: Candidate) -> float:

@@ -91,5 +91,17 @@ def bend_of(bands: Sequence[BandFit]) -> float:
     """
     bends = {b.corner: b.bend for b in bands}
     most = max(bends.values(), key=abs, default=0.0)
-    again = [b for b in bends.values() if b * most > 0.0 and abs(b) > AGAIN]
-    return most if abs(most) > BENT and len(again) > 1 else 0.0
+    return most if abs(most) > BENT and len(bending(bends, most)) > 1 else 0.0
+
+
+def bends_by_itself(bands: Sequence[BandFit]) -> bool:
+    """Whether it is friction that bends so, in as many bands: no load that swings would explain it as well, nor what
+    the axis accelerates with, which is told beside it."""
+    bends = {b.corner: 0.0 if b.swing_bends else b.bend for b in bands}
+    accelerates = bool(bands) and together("inertia", bands).interval[0] > 0.0
+    return accelerates and len(bending(bends, bend_of(bands))) > 1
+
+
+def bending(bends: Mapping[float, float], most: float) -> list[float]:
+    """Those of some bends, by the bands' corners, that go the same way as the largest."""
+    return [b for b in bends.values() if b * most > 0.0 and abs(b) > AGAIN]
