@@ -149,6 +149,7 @@ def test_a_bend_that_a_swing_explains_is_not_called_frictions() -> None:
     found = regress_axis([rigid(coulomb)], AXIS)
     bent = replace(found, bands=tuple(replace(b, bend=-0.2) for b in found.bands))
     assert bends_by_itself(bent.bands)
+    assert not verdicts(bent)["inertia"]
     (said,) = on_bend(bent)
     assert "lubricant" in said
     either = (
@@ -162,6 +163,8 @@ def test_a_bend_that_a_swing_explains_is_not_called_frictions() -> None:
         assert "does not tell which" in said
         doubts = verdicts(replace(bent, bands=bands))
         assert all("does not tell which" in doubts[n] for n in ("fc", "sigma2"))
+        # Of two such logs the inertia was 8 and 31 % too high, identified.
+        assert "do not accelerate as one" in doubts["inertia"]
 
 
 def test_what_a_load_that_swings_takes_from_the_torque_is_no_play() -> None:

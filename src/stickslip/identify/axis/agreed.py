@@ -70,6 +70,7 @@ OR_SWINGS = (
     "the torque bends with velocity by {share:.0%} of Fc, as friction of another form or a load that swings bends it: "
     "this record does not tell which"
 )
+SWINGS = "a load that swings may be what bends the torque with velocity: motor and load then do not accelerate as one"
 LEVELS = ("fc", "sigma2", *FALL)
 """What sliding alone tells of friction; that of v < 0 too where it has parameters of its own."""
 UNSEEN = (
@@ -278,6 +279,8 @@ def told_apart(
             return SMOOTHED.format(lag=1e3 * lag)
         if of_law and found.shows_a_fall and falls_late(name, found.vs, found.fastest):
             return LATE_FALL
+        if bend and name == "inertia" and not bends_by_itself(found.bands):
+            return SWINGS
         if bend and of_law and name in LEVELS:
             said = BENT if bends_by_itself(found.bands) else OR_SWINGS
             return said.format(how="faster" if bend > 0.0 else "more slowly", share=min(abs(bend), 1.0))
