@@ -12,7 +12,6 @@ import numpy as np
 
 import stickslip
 from stickslip.jit import WIDTH, cache_folder, columns_times, kernel, loaded, pointer
-from stickslip.jit.inner import Linked
 
 HEAD = "from stickslip.jit import compile_entry, compile_inner\n"
 INNER = "@compile_inner\ndef {}(v):\n    return {}\n"
@@ -23,6 +22,12 @@ from stickslip.jit import loaded
 for name, text in {files}:
     print(loaded(name, text).steady.ctypes(3.0, None))
 print("stickslip._compiled.first" in sys.modules)
+"""
+LINKED = """
+from stickslip.jit import loaded
+module = loaded("third", {text!r})
+print(*(type(found.library).__name__ for found in module._third.overloads.values()))
+print(module.steady.ctypes(0.1, None))
 """
 
 
@@ -55,12 +60,13 @@ def test_code_that_shares_a_function_with_another_file_is_read_alone(tmp_path):
     assert len(list(kept.rglob("*.nbc"))) == len(files)
 
 
-def test_what_entries_alone_call_has_no_machine_code_of_its_own():
-    """It lies in the entry's, which answers as plain Python does."""
-    module = loaded("third", HEAD + INNER.format("_third", "v / 3.0") + ENTRY.format("_third(v) + 1.0"))
-    (inner,) = module._third.overloads.values()
-    assert isinstance(inner.library, Linked)
-    assert module.steady.ctypes(0.1, None) == 0.1 / 3.0 + 1.0
+def test_what_entries_alone_call_has_no_machine_code_of_its_own(tmp_path):
+    """It lies in the entry's, which answers as plain Python does; what is read from the cache compiles none of it."""
+    text = HEAD + INNER.format("_third", "v / 3.0") + ENTRY.format("_third(v) + 1.0")
+    program = LINKED.format(text=text)
+    answer = str(0.1 / 3.0 + 1.0)
+    assert told(program, tmp_path).split() == ["Linked", answer]
+    assert told(program, tmp_path).split() == [answer]
 
 
 def test_one_text_of_a_function_calls_what_stands_in_its_own_file():
