@@ -253,12 +253,13 @@ def told_apart(
     One band of frequencies alone tells inertia or level (on tuning steps 8 of 19 such levels held, 17 of 26 inertias),
     and the plain inverse dynamics, which has a band of its own, does not second it; or the slope where motor and load
     move apart; the level is extrapolated, or its value had to be moved far towards another method's; or friction rises
-    with velocity in another form, or falls up to the highest speeds; or the column of the torque is smoothed for too
+    with velocity in another form, or a load that swings makes it seem so, which leaves the inertia unsure as well; or
+    friction falls up to the highest speeds; or the column of the torque is smoothed for too
     long. A law that means others by these names has its friction from the prediction error.
     """
     of_law = told_with(model, found)
     (low, high), own = found.interval("fc"), found.numbers["fc"].value
-    bend = bend_of(found.bands)
+    bend, of_friction = bend_of(found.bands), bends_by_itself(found.bands)
     # What sliding hardly tells is the prediction error's.
     clear = {
         "inertia": True, "fc": of_law and high <= RATIO * low, "sigma2": of_law and found.slope_told,
@@ -279,10 +280,10 @@ def told_apart(
             return SMOOTHED.format(lag=1e3 * lag)
         if of_law and found.shows_a_fall and falls_late(name, found.vs, found.fastest):
             return LATE_FALL
-        if bend and name == "inertia" and not bends_by_itself(found.bands):
+        if bend and name == "inertia" and not of_friction:
             return SWINGS
         if bend and of_law and name in LEVELS:
-            said = BENT if bends_by_itself(found.bands) else OR_SWINGS
+            said = BENT if of_friction else OR_SWINGS
             return said.format(how="faster" if bend > 0.0 else "more slowly", share=min(abs(bend), 1.0))
         if alone(e) and (name != "sigma2" or level_alone or found.rough or high > ALONE * low):
             return BAND_ALONE

@@ -42,6 +42,17 @@ def given(
 
     What the column holds does not say how late a current loop makes it act: without the delay nothing is held.
 
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    axis : ServoAxis
+    torque_is : {"commanded", "actual", "mean"} or None
+        What the column holds (`BEHIND`).
+    delay : float or None
+        s from then until the torque acts.
+    regress : callable
+        The regression on certain sliding, by which a contradicted timing is told.
+
     Raises
     ------
     UnknownName
