@@ -9,7 +9,7 @@ from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.number import QUANTILE
 
 PLAIN = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}
-"""Names of the plain inverse dynamics."""
+"""Numbers of a model in which its torque is linear, and their names in the plain inverse dynamics."""
 
 
 def plain_value(name: str, inverse: InverseDynamics | None) -> tuple[float, float] | None:

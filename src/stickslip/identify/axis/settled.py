@@ -18,6 +18,7 @@ import numpy as np
 
 from stickslip.identify.axis.above_nothing import above_nothing, likely
 from stickslip.identify.axis.gravity import hanging, of_one_weight
+from stickslip.identify.axis.plain_numbers import PLAIN
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.bounded import within_bounds
 from stickslip.identify.fit.uncertainty import RATIO, SHARE
@@ -27,8 +28,6 @@ from stickslip.simulation.prescribed.steady import Steady
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-PLAIN = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}
-"""Numbers of a model in which its torque is linear, and their names in the plain inverse dynamics."""
 GRAVITY = ("gravity_sin", "gravity_cos")
 LEAST = 1e-6
 """Of the plain inertia: the least that an axis can have."""
