@@ -166,6 +166,17 @@ def report(rows: Sequence[Row]) -> None:
             print(f"  {key} {value}: {', '.join(parts)}")
 
 
+def furthest(rows: Sequence[Row], count: int) -> None:
+    """What does not hold, and the largest errors of what is called identified, log by log."""
+    for name in NAMES:
+        good = [r for r in rows if r.name == name and r.identified]
+        for r in sorted(good, key=lambda r: (r.inside, -abs(r.error)))[:count]:
+            print(
+                f"  {name} {r.error:+.3f} in {r.half:.3f}, {'holds' if r.inside else 'WRONG'}; least squares "
+                f"{r.plain:.3f}: {' '.join(str(v) for v in r.about.values())}"
+            )
+
+
 def main() -> int:
     """Run the study."""
     parser = argparse.ArgumentParser(
@@ -177,6 +188,9 @@ def main() -> int:
     parser.add_argument("--plain", action="store_true", help="the regression on certain sliding alone")
     parser.add_argument("--exponent", type=float, default=2.0, help="of friction's fall in the logs")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
+    parser.add_argument(
+        "--furthest", type=int, default=0, help="of each number, print so many of the worst logs"
+    )
     args = parser.parse_args()
     tasks = [(c, args.law, args.plain, args.exponent) for c in cells(args.first, args.every)]
     with ProcessPoolExecutor(args.processes) as pool:
@@ -184,6 +198,7 @@ def main() -> int:
     rows = [r for found, _ in results for r in found]
     print(f"{len(tasks)} logs, seeds from {args.first}; {np.mean([s for _, s in results]):.2f} s of CPU each")
     report(rows)
+    furthest(rows, args.furthest)
     return 0
 
 

@@ -32,7 +32,7 @@ from stickslip.report.recommendation_text import beside_lines
 from stickslip.simulation.closed_loop import simulate
 from stickslip.study.bench_decision import CHATTER
 from stickslip.study.bench_metrics import judged
-from stickslip.verbs.recommend import compensators_of
+from stickslip.verbs.candidates_given import compensators_of
 from stickslip.verbs.recommend import recommend as recommend_verb
 
 REFUSED = ("lee-kim", "twisting-implicit", "sliding-mode", "friedland-park", "rbf", "dither")

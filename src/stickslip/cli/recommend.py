@@ -127,7 +127,8 @@ def search_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--compensators", metavar="NAMES",
-        help="observers, adaptive compensators and others to try too: names separated by commas, or all (a minute)",
+        help="observers, adaptive compensators and others to try too: names separated by commas, or all (a minute); a "
+        "TOML file with a table [controller] stands for a controller of your own",
     )  # fmt: skip
     parser.add_argument(
         "--axes",

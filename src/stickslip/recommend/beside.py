@@ -1,7 +1,9 @@
-"""Compensators of the catalogue on the axes of a recommendation: observers, adaptation, sliding modes, resets.
+"""Compensators of the catalogue on the axes of a recommendation: observers, adaptation, sliding modes, resets; and
+controllers of the user's own.
 
-Each is made for the axis from the identified law and run as the settings of a law are; besides, on the best estimate it
-rests for as long as slow limit cycles take. What has been found not worth switching on is not run, and the reason said.
+Each of the catalogue is made for the axis from the identified law, and every one run as the settings of a law are;
+besides, on the best estimate it rests for as long as slow limit cycles take. What has been found not worth switching on
+is not run, and the reason said. A controller of one's own is run as it is.
 """
 
 from __future__ import annotations
@@ -31,13 +33,28 @@ RESTS = 20.0
 
 
 @dataclass(frozen=True, eq=False)
+class Own:
+    """A whole controller of the user's, to be tried besides.
+
+    Attributes
+    ----------
+    name : str
+        What the output calls it.
+    controller : Controller
+    """
+
+    name: str
+    controller: Controller
+
+
+@dataclass(frozen=True, eq=False)
 class Beside:
-    """A compensator of the catalogue in a loop, and what it did on every axis.
+    """A compensator of the catalogue in a loop, or a controller of the user's, and what it did on every axis.
 
     Attributes
     ----------
     name, loop : str
-        Of `stickslip.control.catalogue`; loop is empty where the compensator is the loop.
+        Of `stickslip.control.catalogue`, or `Own`; loop is empty where the compensator is the loop.
     errors : tuple of float
         RMS position error along the motion over that of the linear controller alone, one per axis, the best estimate
         first; empty where it was not run.
@@ -98,7 +115,8 @@ def belief_of(model: Model, drive: Drive, inertia: float) -> Belief:
     """
     if drive.controller is not None:
         raise ParameterError(
-            "compensators of the catalogue bring their own loop; leave controller out, or the compensators"
+            "compensators of the catalogue bring their own loop; leave controller out, or name files of "
+            "controllers of your own alone"
         )
     bandwidth = drive.bandwidth
     if drive.gains is not None:
@@ -112,8 +130,8 @@ def belief_of(model: Model, drive: Drive, inertia: float) -> Belief:
 
 
 def tried_beside(
-    names: Sequence[str],
-    belief: Belief,
+    names: Sequence[str | Own],
+    belief: Belief | None,
     bench: Bench,
     others: Bench,
     inertia: float = 0.0,
@@ -126,16 +144,26 @@ def tried_beside(
 
     Parameters
     ----------
-    names : sequence of str
-        Of the catalogue.
-    belief : Belief
+    names : sequence of str or Own
+        Of the catalogue, and controllers of the user's.
+    belief : Belief or None
+        Of the axis; what is of the catalogue needs one.
     bench, others : Bench
         Axes on which they are chosen, and confirmed.
     inertia, offset : float
-        kg·m² and N·m, fed forward with each of them as with the settings of a law.
+        kg·m² and N·m, fed forward with each of the catalogue as with the settings of a law.
     """
-    pairs = [(name, loop) for name in names for loop in CATALOGUE[name].loops or ("",)]
-    found = [judged(name, loop, belief, bench, inertia, offset) for name, loop in pairs]
+    found = [
+        on_axes(Beside(own.name, "", (), "", own.controller), bench, " ")
+        for own in names
+        if isinstance(own, Own)
+    ]
+    for name in names:
+        if not isinstance(name, Own):
+            assert belief is not None
+            found += [
+                judged(name, loop, belief, bench, inertia, offset) for loop in CATALOGUE[name].loops or ("",)
+            ]
     ready = sorted((b for b in found if not b.why_not), key=lambda b: b.worst)
     left = [b for b in found if b.why_not]
     while ready:

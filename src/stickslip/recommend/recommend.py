@@ -17,7 +17,7 @@ from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.model import Model
 from stickslip.recommend.axes import plants_of
-from stickslip.recommend.beside import belief_of, limit_cycle, tried_beside
+from stickslip.recommend.beside import Own, belief_of, limit_cycle, tried_beside
 from stickslip.recommend.candidate_run import Drive
 from stickslip.recommend.candidates import (
     NEAR,
@@ -61,7 +61,7 @@ ALIKE = 1.02
 
 def recommend(
     found: Identified, drive: Drive, *, inertia: float | None = None, axes: int = 6, confirm: int = 39, seed: int = 0,
-    feed_inertia: bool = True, compensators: Sequence[str] = (),
+    feed_inertia: bool = True, compensators: Sequence[str | Own] = (),
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Recommendation:  # fmt: skip
     """Choose law, structure, gain, lead and deadband.
@@ -81,8 +81,8 @@ def recommend(
     feed_inertia : bool
         Whether the inertia times the reference's acceleration is part of every setting; not where the drive feeds it
         forward itself, or knows no acceleration.
-    compensators : sequence of str
-        Of `stickslip.control.catalogue.CATALOGUE`, which are tried besides.
+    compensators : sequence of str or Own
+        Of `stickslip.control.catalogue.CATALOGUE`, and controllers of the user's: they are tried besides.
     progress : callable
         Called with the axes that are simulated, and all of them that may be.
 
@@ -123,7 +123,8 @@ def recommend(
     chosen = choice.chosen
     beside, hunts = (), ""
     if compensators:
-        belief = belief_of(found.model, drive, j)
+        listed = any(isinstance(name, str) for name in compensators)
+        belief = belief_of(found.model, drive, j) if listed else None
         beside = tried_beside(compensators, belief, bench, others, fed, offset)
         hunts = limit_cycle(chosen.setting.on(linear, laws[chosen.setting.law]), bench, 0) if chosen else ""
     account.end()

@@ -12,12 +12,11 @@ from typing import Any, Literal, cast
 from stickslip.approval import allow_code
 from stickslip.arguments import arguments_checked
 from stickslip.config import named_numbers
-from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller, sample_time_in
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import kind_of_loop
-from stickslip.errors import InputError, UnknownName
+from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.motion import Motion, motion_of
 from stickslip.machines.files import load_machine
@@ -27,6 +26,7 @@ from stickslip.recommend import recommend as setting
 from stickslip.recommend.candidate_run import Drive
 from stickslip.recommend.course import measured
 from stickslip.recommend.sample_time import sample_time_for
+from stickslip.verbs.candidates_given import Given, compensators_of, made_for
 from stickslip.verbs.compare import IdentifiedModel, identified_of
 from stickslip.verbs.reading import Log, open_log
 from stickslip.verbs.recommendation import RecommendationResult
@@ -62,7 +62,7 @@ def recommend(
     frequency: float | None = None,
     inertia: float | None = None,
     feed_inertia: bool = True,
-    compensators: Sequence[str] = (),
+    compensators: Sequence[Given] = (),
     axes: int = 6,
     confirm: int = 39,
     progress: Callable[[int, int], None] = lambda done, of: None,
@@ -111,9 +111,11 @@ def recommend(
         kg·m², where the model has none, or another one.
     feed_inertia : bool
         Whether the inertia times the reference's acceleration is fed forward, too; then it is tried alone as well.
-    compensators : sequence of str
+    compensators : sequence of str, Controller or path
         Of the catalogue of `stickslip study compensators` (observers, adaptation, sliding modes, resets), which are
-        tried besides and switched on where one leaves less; ("all",) for all of them.
+        tried besides and switched on where one leaves less; ("all",) for all of them. A controller of your own, or the
+        path of its file with a table [controller], is tried as it is, in place of the loop: feedforward is its own.
+        The file may name the identified law, ``friction = "identified"``.
     axes : int
         Drawn from the intervals for all candidates.
     confirm : int
@@ -167,10 +169,11 @@ def recommend(
     if at_hand is not None:
         most = at_hand.limits.get("torque", math.inf)
         drive = replace(drive, machine=at_hand, torque_limit=min(drive.torque_limit, most))
+    besides = made_for(tried, drive, inertia or found.axis.get("inertia"), found.model)
     with allow_code(bool(found.law_file)):  # its model has been read: whoever must approve it has
         result = setting.recommend(
             found, drive, inertia=inertia, axes=axes, confirm=confirm, progress=progress, feed_inertia=feed_inertia,
-            compensators=tried,
+            compensators=besides,
         )  # fmt: skip
     return RecommendationResult(result, found)
 
@@ -237,28 +240,6 @@ def refuse_beside(controller: object, **given: object) -> None:
             raise InputError(
                 f"--{option} cannot be combined with --controller{file}, which sets it; leave it out"
             )
-
-
-def compensators_of(names: Sequence[str]) -> tuple[str, ...]:
-    """Names of the catalogue; all of it for ("all",).
-
-    Raises
-    ------
-    UnknownName
-        If there is none of a name.
-    InputError
-        If "all" stands beside another name.
-    """
-    if tuple(names) == ("all",):
-        return tuple(CATALOGUE)
-    if "all" in names:
-        raise InputError(
-            f"--compensators {','.join(names)}: 'all' stands alone; give it without the others, or leave it out"
-        )
-    for name in names:
-        if name not in CATALOGUE:
-            raise UnknownName("compensator", name, (*CATALOGUE, "all"))
-    return tuple(names)
 
 
 def drive_with(
