@@ -12,6 +12,7 @@ import pytest
 from stickslip.identify.axis.agreed import told_apart
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.in_sentences import on_bend, on_creep, on_swing, on_width
+from stickslip.identify.axis.result import IN_SERIES
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.smooth import Window, seen
@@ -262,3 +263,22 @@ def test_a_window_shows_a_derivative_exactly_of_the_power_of_its_order(order: in
     for lower in range(order):
         (none,) = seen(t**lower, window.weights(order))
         assert abs(none[200]) < 1e-6 / window.width ** (order - lower)
+
+
+@pytest.mark.parametrize(
+    ("seed", "imperfection", "rate"), [(110123, "flexible", 250), (110090, "clean", 500)]
+)
+def test_stiffness_that_a_drive_train_may_be_is_not_called_the_contacts(
+    logs, seed, imperfection, rate
+) -> None:
+    """Of 15 stiffnesses identified on logs of other code two were half the truth, both on a flexible train."""
+    loop, motion = ("p-pi", "production") if imperfection == "flexible" else ("pid", "staircase")
+    log = logs.draw(seed, "held", rate, loop, motion, imperfection)
+    found = identify_axis([Experiment("log", log.time, log.position, log.torque)], AXIS, ["lugre"])
+    (stiffness,) = (e for e in found.estimates if e.name == "sigma0")
+    if imperfection == "flexible":
+        assert stiffness.verdict == IN_SERIES
+        assert not stiffness.identified
+    else:
+        assert stiffness.identified
+        assert stiffness.lower <= log.truth["sigma0"] <= stiffness.upper

@@ -29,7 +29,15 @@ from stickslip.identify.axis.form import TOLD_BY_SLIDING, static_by_name, told_w
 from stickslip.identify.axis.output import OutputError
 from stickslip.identify.axis.prediction import axis_prediction
 from stickslip.identify.axis.problem import Problem
-from stickslip.identify.axis.result import assembled, evident, noted, told_whole, untold_by_reversals
+from stickslip.identify.axis.result import (
+    IN_SERIES,
+    ONLY_REVERSALS,
+    assembled,
+    evident,
+    noted,
+    told_whole,
+    untold_by_reversals,
+)
 from stickslip.identify.axis.search import Asked, Extras, FittedAxis, laid_out, starting_models
 from stickslip.identify.axis.settled import ALIKE, settled
 from stickslip.identify.axis.settled_each_way import settled_each_way
@@ -252,8 +260,9 @@ def checked(result: PredictionError | Fitted, evidence: Evidence) -> tuple[tuple
     if sliding is not None:
         scale = result.vector.signed_scale(sliding.friction)
         estimates, said = agreed(estimates, sliding, result.vector, inverse, scale)
-        if not sliding.held_for(HELD):
-            estimates = untold_by_reversals(estimates, result.model, sliding)
+        if not sliding.held_for(HELD) or sliding.bands[0].gives:
+            why = IN_SERIES if sliding.held_for(HELD) else ONLY_REVERSALS
+            estimates = untold_by_reversals(estimates, result.model, sliding, why)
         u = result.vector.coordinates(
             result.vector.named(u) | {e.name: e.value for e in estimates if e.name in TOLD_BY_SLIDING}
         )

@@ -46,6 +46,10 @@ ONLY_REVERSALS = (
     "only reversals determine it, and the torque is not known to act from row to row as recorded; log the command at "
     "the drive's own rate"
 )
+IN_SERIES = (
+    "only reversals determine it, and the torque bends as with a load behind a spring, which yields there, too; record "
+    "slow reversals with a sensor at the load"
+)
 HELD_BY_FRICTION = (
     "the friction level is not determined, and friction at rest holds any torque up to its own: a constant torque "
     "shows where the axis slides both ways"
@@ -269,13 +273,14 @@ def speed_of(experiment: Experiment) -> Array:
 
 
 def untold_by_reversals(
-    estimates: Sequence[Estimate], model: Model, sliding: Regression
+    estimates: Sequence[Estimate], model: Model, sliding: Regression, why: str
 ) -> tuple[Estimate, ...]:
-    """The estimates, those refused that only reversals tell: there a part of a row counts for as much as they do."""
+    """The estimates, those refused that only reversals tell, for that reason: there a part of a row, or of a drive
+    train's twist, counts for as much as they do."""
     v = np.geomspace(1e-4 * sliding.fastest, sliding.fastest, 40)
     steady = {*told_by(model, np.append(-v, v), ()), *TOLD_BY_SLIDING}
     return tuple(
-        replace(e, identified=False, verdict=ONLY_REVERSALS)
+        replace(e, identified=False, verdict=why)
         if e.identified and e.name.partition("[")[0] not in steady else e for e in estimates
     )  # fmt: skip
 

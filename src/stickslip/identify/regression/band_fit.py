@@ -50,6 +50,10 @@ MEMORY = 3.0  # rows over which it is correlated at least
 MOVES = 0.35  # of a torque over the position, by which it moves what accelerates where its orders are not told apart
 
 
+GIVES = 2.0 / 3.0
+"""Part of a rigid axis's misfit that a load behind a spring would leave: from there on it may be what is seen."""
+
+
 @dataclass(frozen=True, eq=False)
 class BandFit:
     """One band's result.
@@ -104,6 +108,11 @@ class BandFit:
     bend: float
     swing_bends: bool
     flexible: float
+
+    @property
+    def gives(self) -> bool:
+        """Whether the torque bends as that of an axis with a load behind a spring."""
+        return self.swing.acceleration != 0.0 or self.flexible <= GIVES
 
 
 def fit_band(
