@@ -57,11 +57,21 @@ def test_a_level_that_would_drive_the_axis_takes_all_verdicts_down(logs: Any) ->
 
 def test_a_model_that_leaves_more_torque_than_there_is_tells_nothing() -> None:
     known = Estimate("inertia", "kg·m²", "J", 1.0, 0.01, 0.98, 1.02, True)
-    (bad,) = explaining([known], {"force_relative": 1.43, "inverse_dynamics_relative": 0.143})
+    (bad,) = explaining([known], {"force_relative": 1.43, "inverse_dynamics_relative": 0.143}, confirmed=True)
     assert (bad.identified, bad.verdict[:50]) == (False, "the model leaves 143% of the torque over the whole")
     for misfit in ({"force_relative": 1.43, "inverse_dynamics_relative": 0.9}, {"force_relative": 0.9}, {},
                    {"force_relative": 1.2, "inverse_dynamics_relative": math.nan}):  # fmt: skip
-        assert explaining([known], misfit) == (known,)
+        assert explaining([known], misfit, confirmed=True) == (known,)
+
+
+def test_what_nothing_confirms_is_not_identified_where_half_of_the_torque_is_left():
+    known = Estimate("inertia", "kg·m²", "J", 2e-3, 1e-4, 1.8e-3, 2.2e-3, True)
+    misfit = {"force_relative": 0.72, "inverse_dynamics_relative": 0.69}
+    assert explaining([known], misfit, confirmed=True) == (known,)
+    (left,) = explaining([known], misfit, confirmed=False)
+    assert not left.identified
+    assert "leaves 72% of the torque" in left.verdict
+    assert explaining([known], {**misfit, "force_relative": 0.4}, confirmed=False) == (known,)
 
 
 def test_what_to_measure_next_does_not_contradict_the_verdict() -> None:

@@ -38,8 +38,11 @@ def calm_beside_drift(
 def beside_drift(
     found: Bands, signals: Sequence[Signals], width: float, axis: ServoAxis, options: Mapping[str, Any], *ask: Any
 ) -> Bands:  # fmt: skip
-    """What was found; what the same windows show beside a drift of friction, where that shows or may be."""
-    if found.drifts:
+    """What was found; what the same windows show beside a drift of friction, where that shows or may be.
+
+    In a motion that is not the same throughout neither is ever said: nothing is fitted then.
+    """
+    if found.drifts or not same_motion(found.rows):
         return found
     exponents = GAUSSIAN if found.widened > 1.0 else tuple(USUAL_EXPONENTS)
     beside = {**options, "drifting": True, "train": found.train}

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,6 +103,11 @@ class Signals:
     def middle(self) -> float:
         """Half way from the first row to the last, s."""
         return 0.5 * float(self.time[0] + self.time[-1])
+
+    @cached_property
+    def kept(self) -> dict[Window, SlidingRows]:
+        """What windows have shown: most are asked for again, beside another skew or a drift."""
+        return {}
 
 
 def signals_of(experiment: Experiment, axis: ServoAxis) -> Signals:
@@ -255,6 +261,13 @@ def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
     InputError
         If there are hardly any.
     """
+    if window not in signals.kept:
+        signals.kept[window] = seen_through(signals, window)
+    return signals.kept[window]
+
+
+def seen_through(signals: Signals, window: Window) -> SlidingRows:
+    """The same, looked at anew."""
     q, period = signals.position, signals.period
     v, a, jerk, snap = seen(q, *(window.weights(k) for k in (1, 2, 3, 4)))
     fine = fine_window(window)
