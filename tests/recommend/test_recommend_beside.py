@@ -22,7 +22,7 @@ from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.recommend import beside
+from stickslip.recommend import beside, long_rest
 from stickslip.recommend import recommend as recommending
 from stickslip.recommend.beside import belief_of, tried_beside
 from stickslip.recommend.file import write_setting
@@ -175,9 +175,9 @@ def test_what_is_wrong_is_said_in_a_line():
 )
 def test_a_limit_cycle_is_as_large_as_what_rises_and_falls_again(monkeypatch, cycles, counts, swing, said):
     drive = Drive(amplitude=0.2, encoder_counts=counts)
-    seen = round(0.5 * beside.RESTS / drive.sample_time)
+    seen = round(0.5 * long_rest.RESTS / drive.sample_time)
     position = 0.5 * swing * np.cos(2.0 * math.pi * cycles * np.linspace(0.0, 1.0, seen))
-    monkeypatch.setattr(beside, "simulated", lambda *_: position)
+    monkeypatch.setattr(long_rest, "simulated", lambda *_: position)
     before = beside.Trial({"position_rms_rad": 1e-6}, position, position, drive.sample_time)
     bench = SimpleNamespace(drive=drive, plants=[None], before=lambda _: before, ran=lambda: None)
     assert beside.limit_cycle(None, bench, 0) == said

@@ -13,8 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from stickslip.analyse.observer_guard import objection
 from stickslip.control.belief import Belief, believed
 from stickslip.control.block import ControlBlock
@@ -25,11 +23,7 @@ from stickslip.errors import ParameterError
 from stickslip.model import Model
 from stickslip.recommend.candidate_run import AT_REST, Drive, Trial, dangers
 from stickslip.recommend.candidates import NEAR, Bench, why_lost
-from stickslip.recommend.following import simulated
-from stickslip.recommend.swings import back_and_forth, between_counts
-
-RESTS = 20.0
-"""s at rest, of which the second half is judged: an integral that is reset on a soft contact cycles in 6 to 12 s."""
+from stickslip.recommend.long_rest import swing_for_long
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,15 +266,7 @@ def unsafe_at(beside: Beside, before: Trial, after: Trial, drive: Drive) -> list
 
 def limit_cycle(controller: Controller, bench: Bench, axis: int) -> str:
     """What it does at rest for long after the motion on one of the axes, where it goes to and fro, or ""."""
-    drive, before = bench.drive, bench.before(axis)
-    assert isinstance(before, Trial)
-    last = drive.reference[-1] * np.array([1.0, 0.0, 0.0])
-    held = np.tile(last, (round(RESTS / drive.sample_time), 1))
-    reference = np.vstack([drive.reference, held])
-    position = simulated(bench.plants[axis], controller, reference)
-    bench.ran()
-    if position is None:
+    swing = swing_for_long(controller, bench, axis)
+    if math.isinf(swing):
         return "at rest position or velocity left every reasonable bound"
-    swing = back_and_forth(position[-held.shape[0] // 2 :])
-    most = max(before.swing(drive), between_counts(drive.encoder_counts))
-    return f"hunts at rest, {1e6 * swing:.0f} µrad peak to peak" if swing > most else ""
+    return f"hunts at rest, {1e6 * swing:.0f} µrad peak to peak" if swing > 0.0 else ""

@@ -29,6 +29,7 @@ from stickslip.recommend.candidates import (
     on_both,
     rings_alone,
 )
+from stickslip.recommend.long_rest import hunts_alone, unsure_at_rest
 from stickslip.recommend.motion_notes import by_reference_velocity, on_motion
 from stickslip.recommend.notes import (
     ALLOWANCE,
@@ -118,7 +119,8 @@ def recommend(
     )
     first = held(found, bench.before(0), drive, inertia)
     # By the axes of the confirmation, if there are more of them: what is said is then the same for any `axes`.
-    rung = rings_alone(max(others, bench, key=lambda b: len(b.plants)), j, found.unit("N·m"))
+    told = max(others, bench, key=lambda b: len(b.plants))
+    rung = rings_alone(told, j, found.unit("N·m")) or hunts_alone(told, found.unit("N·m"))
     choice = picked(settings, bench, others, account)
     chosen = choice.chosen
     beside, hunts = (), ""
@@ -134,7 +136,7 @@ def recommend(
         *notes_on(
             found, chosen, choice.candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine,
         ),
-        *beyond_inertia(chosen, choice.friction, choice.candidates),
+        *beyond_inertia(chosen, choice.friction, choice.candidates), *(() if rung else unsure_at_rest(found, linear)),
         *(doubted_inertia(found, choice.candidates) if chosen is None and inertia is None else ()),
     ]  # fmt: skip
     return Recommendation(

@@ -54,10 +54,14 @@ def integral_of(gains: Gains | Cascade) -> tuple[str, float]:
 
 
 def hunting(gains: Gains | Cascade, given: bool) -> str:
+    """Cause and remedy of an integral part that hunts against friction, where an encoder might be thought to."""
+    why = "not of the encoder's counts alone, so that a finer one does not end it"
+    return f": {why}; {against_friction(gains, given)}"
+
+
+def against_friction(gains: Gains | Cascade, given: bool) -> str:
     """Cause and remedy of an integral part that hunts against friction."""
     name, value = integral_of(gains)
     less = f"lower {name} ({value:.4g})" if given else "take a loop without it (--linear PD)"
-    return (
-        ": not of the encoder's counts alone, so that a finer one does not end it; the integral part hunts against the "
-        f"friction at rest; {less}, or hold the integral while the error is small"
-    )
+    held = "hold the integral while the error is small"
+    return f"the integral part hunts against the friction at rest; {less}, or {held}"
