@@ -12,6 +12,7 @@ from stickslip.export import target_named
 from stickslip.export.job import CannotCarry, Job
 from stickslip.export.nearest import COULOMB, STATIC, STRIBECK, Curve, carried, nearest
 from stickslip.model import Model
+from stickslip.verbs.export import export as export_verb
 from support.laws import farthest, label, registered
 
 FORMS = (COULOMB, STATIC, STRIBECK)
@@ -118,3 +119,16 @@ def test_settings_are_asked_for_by_name():
     assert 'name="elbow"' in urdf.write(Job(model, "x", settings={"joint": "elbow"})).files["x.urdf"]
     with pytest.raises(InputError, match="joint"):
         urdf.write(Job(model, "x", settings={"joints": "elbow"}))
+
+
+def test_an_identified_model_is_compared_up_to_the_fastest_recorded(tmp_path):
+    """A curve up to 100 times the velocity over which its law changes says nothing of an axis that is faster."""
+    file = tmp_path / "model.toml"
+    file.write_text(
+        'law = "stribeck"\n[parameters]\nk = 50.0\nfs = 0.4\nfc = 0.3\nvs = 0.01\nsigma2 = 0.02\n'
+        "[speeds]\npositive = [0.01, 0.5, 30.0]\nnegative = [-0.02, -1.0, -40.0]\n"
+    )
+    with pytest.raises(CannotCarry, match=r"from 0 to 40 rad/s; top_speed gives another"):
+        export_verb(file, "mujoco", settings={"inertia": 1e-3})
+    with pytest.raises(CannotCarry, match=r"from 0 to 2 rad/s"):
+        export_verb(file, "mujoco", settings={"inertia": 1e-3}, top_speed=2.0)

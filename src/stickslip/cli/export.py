@@ -44,7 +44,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--top-speed", type=float, metavar="SPEED",
         help="highest velocity of the application, for tables and sliding curves, rad/s "
-        "(default: 100 times the velocity over which the law changes)",
+        "(default: the fastest recorded of an identified model, "
+        "else 100 times the velocity over which the law changes)",
     )  # fmt: skip
     parser.add_argument(
         "--set",

@@ -221,7 +221,7 @@ def carried(job: Job, target: str, forms: Sequence[Form], also_lost: Sequence[st
         return best
     raise CannotCarry(
         f"{target} carries {best.form.words}; {job.model.law.name} would lose {'; '.join(best.lost)}. The nearest is "
-        f"{best.values}: {best.error}. Take it with --nearest"
+        f"{best.values}: {best.error}; --top-speed gives another highest velocity. Take it with --nearest"
     )
 
 

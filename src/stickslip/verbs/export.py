@@ -10,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.config import Document, Table, read_toml
 from stickslip.control.controller import Controller
@@ -165,7 +167,8 @@ def export(
     nearest : bool
         Where the target cannot hold the law, the nearest that it can.
     top_speed : float, optional
-        Greatest velocity of the application, rad/s.
+        Greatest velocity of the application, rad/s, up to which tables are made and sliding curves compared; the
+        fastest recorded of an identified model unless given, else 100 times the velocity over which the law changes.
     settings : mapping, optional
         What only the target asks for, by name.
     check : bool
@@ -213,7 +216,7 @@ def export(
         return saved(with_notes(result, renamed), folder)
     job = job_of(source, content, own, chosen)
     given = {**job.settings, **(settings or {})}
-    job = replace(job, single=single, nearest=nearest, top_speed=top_speed, settings=given)
+    job = replace(job, single=single, nearest=nearest, top_speed=top_speed or job.top_speed, settings=given)
     return saved(with_notes(exported_law(content, job, chosen, check), renamed), folder)
 
 
@@ -365,4 +368,11 @@ def job_of(source: Source, content: Table, name: str, chosen: Target) -> Job:
     """The model, with what the file knows of its axis."""
     known = axis_of(content)
     settings: dict[str, str | float] = {s.name: known[s.name] for s in chosen.settings if s.name in known}
-    return Job(model_of(source, content), name, settings=settings)
+    return Job(model_of(source, content), name, top_speed=fastest_recorded(content), settings=settings)
+
+
+def fastest_recorded(content: Table) -> float | None:
+    """The highest speed of the records that a model was identified from, rad/s; None where it does not tell one."""
+    recorded: Any = content.values.get("speeds", {})
+    sides = [np.abs(np.array(side, dtype=np.float64)) for side in recorded.values() if side]
+    return max((float(np.max(side)) for side in sides), default=0.0) or None
