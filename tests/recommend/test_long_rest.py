@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,8 +15,9 @@ from stickslip.control.linear import pid
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
+from stickslip.recommend import long_rest
 from stickslip.recommend import recommend as recommending
-from stickslip.recommend.long_rest import integrates, unsure_at_rest
+from stickslip.recommend.long_rest import HUNTS, hunts_with, integrates, unsure_at_rest
 from stickslip.recommend.recommend import Drive, recommend
 from stickslip.simulation.closed_loop import simulate
 
@@ -70,3 +72,13 @@ def test_hunting_is_unsure_where_friction_at_rest_is_not_identified():
 def replace_ki(ki: float):
     """The same gains with another integral."""
     return GAINS._replace(ki=ki)
+
+
+def test_a_compensator_that_wakes_an_integral_is_refused(monkeypatch):
+    """What swings by half as much again as alone, or where nothing does alone, is the compensator's."""
+    bench = SimpleNamespace(rested=[0.0, 0.01], linear=Controller(GAINS, sample_time=1e-3))
+    for widest, said in ((0.014, ""), (0.016, HUNTS)):
+        monkeypatch.setattr(long_rest, "swings_for_long", lambda *_, widest=widest: [0.0, widest])
+        assert hunts_with(bench.linear, bench) == said
+    bench.rested = []  # it has no integral part
+    assert hunts_with(bench.linear, bench) == ""

@@ -191,6 +191,7 @@ def test_what_is_switched_on_tells_what_it_learned_with_its_uncertainty():
     taken = beside.Beside("scale-dob", "PD", (0.1,), "", None, learned)
     lines = beside_lines(SimpleNamespace(beside=(taken,), instead=taken, hunts=""))
     assert lines[-3].startswith("switch on instead: PD + scale-dob; it leaves at most 10.0 %")
+    assert "up to 14.0 % with what is not simulated" in lines[-3]
     assert lines[-2] == "learned there:     scale (feedforward_scale) = 1.02 ± 0.03"
     assert lines[-1].endswith("= 2 values from 0.1 to 0.2 N·m; no uncertainty given")
 

@@ -179,7 +179,8 @@ class Account:
 class Bench:
     """Axes, each with what the linear controller alone does on it, and the laws that may be switched on.
 
-    `ran` is called after every axis that was simulated. `left_out` counts axes that were drawn and not held.
+    `ran` is called after every axis that was simulated. `left_out` counts axes that were drawn and not held; `rested`
+    is what the linear controller alone swings by at rest for long, once it is known.
     """
 
     def __init__(
@@ -189,6 +190,7 @@ class Bench:
         self.plants, self.linear, self.drive, self.laws, self.ran = plants, linear, drive, laws, ran
         self.alone: list[Trial | str] = []
         self.left_out = 0
+        self.rested: list[float] | None = None
         self._judged: dict[Setting, Candidate] = {}
         self._pushed: dict[int, float] = {}
 

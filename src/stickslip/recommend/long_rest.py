@@ -17,10 +17,13 @@ from stickslip.recommend.swings import back_and_forth, between_counts
 
 RESTS = 20.0
 """s at rest, of which the second half is judged: an integral that is reset on a soft contact cycles in 6 to 12 s."""
-OFF = 1.0
-"""Times its error along the motion, by which the linear controller then moves on."""
+OFF = (0.0, 1.0)
+"""Times its error along the motion, by which the reference then moves on, for each of two rests."""
+MORE = 1.5
+"""Times the linear controller's widest swing, from which on a compensator is what hunts."""
+HUNTS = f"hunts at rest within {RESTS:g} s"
 ASKED = 8
-"""Axes on which the linear controller alone rests for so long."""
+"""Axes on which a loop with an integral part rests for so long."""
 
 
 def swing_for_long(controller: Controller, bench: Bench, axis: int, off: float = 0.0) -> float:
@@ -44,6 +47,30 @@ def swing_for_long(controller: Controller, bench: Bench, axis: int, off: float =
     return swing if swing > most else 0.0
 
 
+def swings_for_long(controller: Controller, bench: Bench) -> list[float]:
+    """The wider of both swings on each of the first axes, where the motion ends and beside it, rad."""
+    axes = [i for i in range(min(ASKED, len(bench.plants))) if isinstance(bench.before(i), Trial)]
+    places = [(i, off) for i in axes for off in OFF]
+    swings = list(in_turn(lambda place: swing_for_long(controller, bench, *place), places))
+    return [max(swings[k : k + len(OFF)]) for k in range(0, len(swings), len(OFF))]
+
+
+def alone_for_long(bench: Bench) -> list[float]:
+    """The same of the linear controller alone, simulated once; nothing of one without an integral part."""
+    if bench.rested is None:
+        bench.rested = swings_for_long(bench.linear, bench) if integrates(bench.linear) else []
+    return bench.rested
+
+
+def hunts_with(controller: Controller, bench: Bench) -> str:
+    """That an integral part hunts with a compensator, and not, or by far less, alone; else ""."""
+    alone = alone_for_long(bench)
+    if not alone:
+        return ""
+    widest = max(swings_for_long(controller, bench))
+    return HUNTS if widest > MORE * max(alone) else ""
+
+
 def hunts_alone(bench: Bench, torque: str) -> str:
     """That the linear controller alone hunts within seconds at rest, by how much, why, and what to change; empty where
     it has no integral part or comes to rest.
@@ -54,15 +81,11 @@ def hunts_alone(bench: Bench, torque: str) -> str:
     torque : str
         Unit of the torque: that of the swing follows.
     """
-    gains = bench.linear.gains
-    if not integrates(bench.linear):
-        return ""
-    asked = [i for i in range(min(ASKED, len(bench.plants))) if isinstance(bench.before(i), Trial)]
-    swings = in_turn(lambda i: swing_for_long(bench.linear, bench, i, OFF), asked)
+    swings, gains = alone_for_long(bench), bench.linear.gains
     found = [swing for swing in swings if swing > 0.0]
     if not found:
         return ""
-    on = f"on {len(found)} of {len(asked)} axes" if len(asked) > 1 else "on the best estimate"
+    on = f"on {len(found)} of {len(swings)} axes" if len(swings) > 1 else "on the best estimate"
     why = (
         against_friction(gains, bench.drive.given)
         if gains is not None

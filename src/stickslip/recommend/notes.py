@@ -16,8 +16,8 @@ from stickslip.recommend.candidate_run import Drive, Trial, run
 from stickslip.recommend.candidates import Bench, Candidate, resistance
 from stickslip.recommend.sample_time import ROWS
 
-MOSTLY = 0.5
-"""Of the error: what a lag makes beyond that is most of it."""
+MOSTLY, PARTLY = 0.5, 0.15
+"""Of the error: what a lag makes beyond that is most of it; and from where on it is worth a word."""
 ALLOWANCE, BETTER = 1.4, 2.0
 """Factors on the error left, upwards and downwards, for resonances, backlash, cogging and the like, which a machine has
 or has not: so the promise held in `benchmarks/promise.py`."""
@@ -52,7 +52,8 @@ def axes_left_out(bench: Bench, others: Bench, found: Identified) -> Iterator[st
 
 
 def lag_of(plant: RigidAxis, alone: Trial, linear: Controller, drive: Drive) -> Iterator[str]:
-    """Whether most of the error is the lag of a loop without velocity feedforward, which no friction makes.
+    """How much of the error is the lag of a loop that does not feed all of the velocity forward, which no friction
+    makes.
 
     The loop that feeds the velocity tells: what it leaves on the same axis is not the lag's.
     """
@@ -63,9 +64,10 @@ def lag_of(plant: RigidAxis, alone: Trial, linear: Controller, drive: Drive) -> 
     if isinstance(trial, str):
         return
     left = trial.moving["position_rms_rad"] / alone.moving["position_rms_rad"]
-    if left <= 1.0 - MOSTLY:
+    if left <= 1.0 - PARTLY:
+        part = "Most" if left <= 1.0 - MOSTLY else f"{100.0 * (1.0 - left):.0f} %"
         yield (
-            f"Most of the error is no friction's: {lag_words(linear.gains)}; feed the velocity forward first, which "
+            f"{part} of the error is no friction's: {lag_words(linear.gains)}; feed the velocity forward first, which "
             f"leaves {100.0 * left:.2g} % of the error without any compensator."
         )
 
@@ -80,7 +82,10 @@ def with_velocity_fed(gains: Gains | Cascade | None) -> Gains | Cascade | None:
 def lag_words(gains: Gains | Cascade | None) -> str:
     """Why the position lags behind."""
     if isinstance(gains, Cascade):
-        return f"without velocity feedforward (feed = {gains.feed:g}) the position lags behind by the velocity over kv"
+        if gains.feed == 0.0:
+            return "without velocity feedforward (feed = 0) the position lags behind by the velocity over kv"
+        missing = f"{1.0 - gains.feed:.2g} times the velocity over kv"
+        return f"with feed = {gains.feed:g} the position lags behind by {missing}"
     assert gains is not None
     return (
         f"with kr = {gains.kr:.4g} below kd = {gains.kd:.4g} the position lags behind by (kd - kr) / kp times the "

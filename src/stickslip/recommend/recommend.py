@@ -29,7 +29,7 @@ from stickslip.recommend.candidates import (
     on_both,
     rings_alone,
 )
-from stickslip.recommend.long_rest import hunts_alone, unsure_at_rest
+from stickslip.recommend.long_rest import hunts_alone, hunts_with, unsure_at_rest
 from stickslip.recommend.motion_notes import by_reference_velocity, on_motion
 from stickslip.recommend.notes import (
     ALLOWANCE,
@@ -118,8 +118,7 @@ def recommend(
         for count, start_of_draws in ((axes, seed), (confirm, seed + 1))
     )
     first = held(found, bench.before(0), drive, inertia)
-    # By the axes of the confirmation, if there are more of them: what is said is then the same for any `axes`.
-    told = max(others, bench, key=lambda b: len(b.plants))
+    told = of_more_axes(bench, others)
     rung = rings_alone(told, j, found.unit("N·m")) or hunts_alone(told, found.unit("N·m"))
     choice = picked(settings, bench, others, account)
     chosen = choice.chosen
@@ -346,7 +345,16 @@ def insisted(setting: Setting, bench: Bench, others: Bench) -> tuple[Candidate, 
         return replace(final, useless=UNSURE + later), ""
     if (trial := others.judged(more)).unsafe:
         return trial, guarded + later
+    told = of_more_axes(bench, others)
+    if hunts := hunts_with(setting.on(told.linear, told.laws[setting.law]), told):
+        return replace(final, unsafe=(hunts,)), ""
     return final, ""
+
+
+def of_more_axes(bench: Bench, others: Bench) -> Bench:
+    """What is said of the linear controller alone is said by the confirmation's axes, if there are more of them: it is
+    then the same however many the settings were chosen on."""
+    return max(others, bench, key=lambda b: len(b.plants))
 
 
 def with_lead(candidate: Candidate, bench: Bench) -> Candidate:

@@ -129,7 +129,8 @@ def beside_lines(result: Recommendation) -> list[str]:
     if taken is None:
         return [*out, "none of these is better than what is said above"]
     said = (
-        f"it leaves at most {100 * taken.at_most:.1f} % of the linear controller's error on all sampled axes"
+        f"it leaves at most {100 * taken.at_most:.1f} % of the linear controller's error on all sampled axes, up to "
+        f"{100 * min(ALLOWANCE * taken.at_most, 1.0):.1f} % with what is not simulated"
     )
     why = f"; the setting above {result.hunts}" if result.hunts else ""
     learned = [f"learned there:     {line}" for line in told({"learned": taken.learned})]
