@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.model import Reference
-from stickslip.simulation._meter import HIGH_PASS, close_standstill, meter, new_meter
+from stickslip.simulation._meter import HIGH_PASS, close_standstill, meter, new_meter, turning_points
 from stickslip.simulation.metrics import limit_cycle, metrics, settle_band_of
 
 
@@ -116,3 +116,34 @@ def test_limit_cycle_needs_five_even_periods():
     assert period == pytest.approx(0.1)
     assert math.isnan(limit_cycle(cycle(4), 2.0)[0])
     assert math.isnan(limit_cycle(cycle(6, wobble=0.2), 2.0)[0])
+
+
+@pytest.mark.parametrize("rings", [1, 2, 7])
+@pytest.mark.parametrize("wobble", [0.01, 0.2])
+def test_small_turns_at_the_ends_of_swings_neither_hide_a_limit_cycle_nor_make_one(rings, wobble):
+    """As of a contact that springs back where the axis stops."""
+    plain = cycle(6, wobble=wobble)
+    ringing = []
+    for t, x in plain.tolist():
+        for i in range(2 * rings + 1):
+            ringing.append((t + 1e-3 * i, x * (1.0 - 0.05 * (i % 2) - 0.002 * i)))
+    assert limit_cycle(np.array(ringing), 2.0) == pytest.approx(limit_cycle(plain, 2.0), nan_ok=True)
+
+
+def test_turns_without_a_swing_of_their_own_are_no_limit_cycle():
+    still = np.column_stack([np.linspace(1.3, 2.0, 40), np.full(40, 0.1)])
+    assert math.isnan(limit_cycle(still, 2.0)[0])
+
+
+def test_a_limit_cycle_that_turns_oftener_than_is_remembered_is_found():
+    """Its turns filled the room before the last 40 % of the run, where a limit cycle is looked for."""
+    w, duration = 2.0 * math.pi * 200.0, 3.0
+    acc, turns = new_meter(duration, 0.0), np.empty((600, 2))
+    for i in range(round(duration / 1e-3)):
+        t = 1e-3 * i + 0.25e-3 * np.arange(5)
+        nodes = np.zeros((8, 5))
+        nodes[2], nodes[3] = 1e-3 * np.sin(w * t), 1e-3 * w * np.cos(w * t)
+        meter(acc, turns, 1e-3 * i, 1e-3, nodes)
+    found = metrics(acc, turning_points(acc, turns))
+    assert found["limit_cycle_period_s"] == pytest.approx(0.005, rel=1e-3)
+    assert found["limit_cycle_amplitude_rad"] == pytest.approx(1e-3, rel=0.02)

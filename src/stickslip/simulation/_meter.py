@@ -33,6 +33,7 @@ HIGH_PASS = 2.0 * math.pi * 50.0  # rad/s
 MOVING = 2e-3  # rad/s, the reference moves
 STANDSTILL = 10e-3  # s, shortest standstill that counts
 MAX_WINDOW = 2e-3  # s
+LATE = 0.6  # part of the run, from which on limit cycles are looked for
 LONG_WINDOW = 16e-3  # s, where only the metrics of COARSE are wanted
 
 METER = np.dtype(
@@ -287,12 +288,25 @@ def confirm(acc: Any, turns: Turns, v: float, second: bool) -> None:
         acc.reversals += 1
         if second:
             acc.w2_reversals += 1
+        if acc.turn_count == turns.room:
+            forget_early(acc, turns)
         n = acc.turn_count
         if n < turns.room:
             turns.at[2 * n] = acc.turn_time
             turns.at[2 * n + 1] = acc.turn_position
             acc.turn_count += 1
     acc.side = side
+
+
+@kernel(exact=False)
+def forget_early(acc: Any, turns: Turns) -> None:
+    """Make room by the turns before those among which a limit cycle is looked for: fast ones fill it long before."""
+    early = 0
+    while early < turns.room and turns.at[2 * early] < LATE * acc.duration:
+        early += 1
+    for i in range(2 * early, 2 * turns.room):
+        turns.at[i - 2 * early] = turns.at[i]
+    acc.turn_count -= early
 
 
 @kernel(exact=False, inline=True)

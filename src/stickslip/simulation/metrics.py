@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel
-from stickslip.simulation._meter import SIZE, gathered
+from stickslip.simulation._meter import LATE, SIZE, gathered
 
 
 def settle_band_of(reference: Any, duration: float) -> float:
@@ -39,15 +39,8 @@ def mean_and_deviation(turns: Any, first: int, apart: int, kind: int) -> tuple[f
 
 
 @kernel()
-def limit_cycle(turns: Any, duration: float) -> tuple[float, float]:
-    """Amplitude (rad) and period (s) of a limit cycle in the last 40 % of a run, or two NaN.
-
-    There is one where at least 5 periods have amplitudes and periods that spread (standard deviation over
-    mean) by less than 5 %. ``turns`` has time and position of the velocity's reversals, shape (n, 2), ascending.
-    """
-    first = 0
-    while first < turns.shape[0] and turns[first, 0] < 0.6 * duration:
-        first += 1
+def even_cycle(turns: Any, first: int) -> tuple[float, float]:
+    """Amplitude (rad) and period (s) of turns from `first` on that are those of at least 5 even periods, or two NaN."""
     count = turns.shape[0] - first
     if count < 11:
         return math.nan, math.nan
@@ -60,6 +53,63 @@ def limit_cycle(turns: Any, duration: float) -> tuple[float, float]:
             return math.nan, math.nan
         found = (mean, found[0])
     return 0.5 * found[0], found[1]
+
+
+@kernel()
+def side_of(position: float, middle: float, swing: float) -> float:
+    """Above (1) or below (-1) the middle quarters of the whole swing, or in them (0)."""
+    if abs(position - middle) < 0.25 * swing:
+        return 0.0
+    return 1.0 if position > middle else -1.0
+
+
+@kernel()
+def ends_of_swings(turns: Any, first: int) -> int:
+    """Put, from `first` on, the ends of whole swings in the place of all turns; returns where they end.
+
+    Where an axis stops its bristles spring back and ring: many small turns about the end of one swing. That end is
+    the farthest of them, and its time that of the first which is about as far.
+    """
+    low, high = math.inf, -math.inf
+    for i in range(first, turns.shape[0]):
+        low = min(low, turns[i, 1])
+        high = max(high, turns[i, 1])
+    middle, swing = 0.5 * (low + high), high - low
+    kept, begin = first, first
+    while begin < turns.shape[0]:
+        side = side_of(turns[begin, 1], middle, swing)
+        end, farthest = begin, turns[begin, 1]
+        while end < turns.shape[0] and side * side_of(turns[end, 1], middle, swing) >= 0.0:
+            if side * (turns[end, 1] - farthest) > 0.0:
+                farthest = turns[end, 1]
+            end += 1
+            if side == 0.0:
+                break
+        if side != 0.0:
+            while side * (farthest - turns[begin, 1]) > 0.1 * swing:
+                begin += 1
+            turns[kept, 0] = turns[begin, 0]
+            turns[kept, 1] = farthest
+            kept += 1
+        begin = end
+    return kept
+
+
+@kernel()
+def limit_cycle(turns: Any, duration: float) -> tuple[float, float]:
+    """Amplitude (rad) and period (s) of a limit cycle in the last 40 % of a run, or two NaN.
+
+    There is one where at least 5 periods have amplitudes and periods that spread (standard deviation over
+    mean) by less than 5 %. ``turns`` has time and position of the velocity's reversals, shape (n, 2), ascending; it is
+    written over where these are not themselves the ends of even swings.
+    """
+    first = 0
+    while first < turns.shape[0] and turns[first, 0] < LATE * duration:
+        first += 1
+    found = even_cycle(turns, first)
+    if math.isnan(found[0]):
+        found = even_cycle(turns[: ends_of_swings(turns, first)], first)
+    return found
 
 
 SETTLED_FOR = 0.1
