@@ -16,6 +16,7 @@ from stickslip.analyse.stability_result import Cycle
 from stickslip.analyse.wording import quantity
 from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
+from stickslip.friction_levels import static_level
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -26,6 +27,14 @@ LATEST = 20.0
 FAST = 50.0
 """Times the velocity over which friction changes: fast sliding."""
 DRAWN = 200
+INTEGRATES = 1e-6
+"""Distance from 1 of the pole of an integral action; of one that leaks it is larger."""
+HUNTING = (
+    "the loop integrates and friction holds {} at rest; whether it hunts (sticks and slips for ever) no poles tell: "
+    'simulate a step of 60 s or more (`ss.simulate(machine, controller, ss.Reference("step", amplitude=0.1), 120.0)`, '
+    "`stickslip simulate FILE.toml --json`) and read the metric limit_cycle_amplitude_rad"
+)
+"""What is said of a loop that may hunt, with the static friction."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +51,40 @@ class LoopMargins:
         not stable.
     delay : float
         Samples by which the torque may come later besides; NaN where it is not stable.
+    phase : float
+        Phase margin, degrees: the least where the loop's transfer function crosses 1; infinite where it does not,
+        NaN where the loop is not stable.
+    crossover : float
+        Frequency there, Hz; NaN where there is none.
     """
 
     name: str
     poles: Poles
     torque: tuple[float, float]
     delay: float
+    phase: float
+    crossover: float
+
+    @property
+    def gain_dB(self) -> tuple[float, float]:
+        """Gain margins, dB: how much less (negative) and more torque the loop bears; infinite beyond what is tried."""
+        low, high = self.torque
+        return (
+            20.0 * math.log10(low) if not low <= LEAST else -math.inf,
+            20.0 * math.log10(high) if not high >= MOST else math.inf,
+        )
+
+    def margins(self) -> str:
+        """Gain and phase margin, in words."""
+        low, high = self.gain_dB
+        less = f", {low:.1f} dB" if math.isfinite(low) else ""
+        more = f"{high:.1f} dB" if math.isfinite(high) else f"> {20.0 * math.log10(MOST):.0f} dB"
+        turn = (
+            f"phase margin {self.phase:.1f}° at the crossover, {quantity(self.crossover, 'Hz')}"
+            if math.isfinite(self.phase)
+            else "no crossover"
+        )
+        return f"{self.name}, gain margin {more}{less}; {turn}"
 
     def line(self) -> str:
         """A row of the table."""
@@ -82,6 +119,9 @@ class ControllerStability:
         The part of the contact that may be missing while it sticks; NaN where the loop is unstable anyway.
     cycle : Cycle or None
         Where an unstable loop ends while it sticks.
+    held : float
+        Static friction that an integral action works against, N·m; 0 where there is none of either. Whether such a
+        loop hunts (sticks and slips for ever) its poles do not tell.
     linear_to : float
         Motion at the encoder up to which the laws are linear at the frequencies of both loops, rad, and these loops
         theirs; at most `reach`. Below `amplitude` there are no poles to be told (`is_linear`).
@@ -97,6 +137,7 @@ class ControllerStability:
     estimator_delay: float
     softer: float
     cycle: Cycle | None
+    held: float
     linear_to: float
     frequency: Array
     response: Any
@@ -127,12 +168,14 @@ class ControllerStability:
         return {
             "laws": list(self.laws), "amplitude": self.amplitude, "contact_stiffness": self.stiffness,
             "sample_time": self.sample_time, "estimator_delay": self.estimator_delay, "softer": self.softer,
-            "cycle": vars(self.told_cycle) if self.told_cycle else None, "linear_to": self.linear_to,
-            "linear": self.is_linear,
+            "cycle": vars(self.told_cycle) if self.told_cycle else None, "held": self.held,
+            "linear_to": self.linear_to, "linear": self.is_linear,
             "loops": [
                 {
                     "name": loop.name, "stable": loop.poles.stable, "growth": loop.poles.growth,
                     "frequency": loop.poles.frequency, "torque": list(loop.torque), "delay": loop.delay,
+                    "gain_margin_dB": list(loop.gain_dB), "phase_margin_deg": loop.phase,
+                    "crossover_Hz": loop.crossover,
                 } if self.is_linear else {"name": loop.name, "stable": None}
                 for loop in self.loops
             ],
@@ -159,19 +202,25 @@ class ControllerStability:
                 f"(of motion up to {quantity(self.reach, 'rad')}) do not describe: simulate it (--confirm, `stickslip "
                 "rig run track`)"
             )
+        if self.held > 0.0 and all(loop.poles.stable for loop in self.loops):
+            yield HUNTING.format(quantity(self.held, "N·m"))
 
     def _poles(self) -> Iterator[str]:
         """Poles and margins of both loops, and where an unstable one ends."""
         yield f"{'':<10}{'':<10}{'least stable pole':<22}{'torque times':>16}{'samples later':>16}"
         for loop in self.loops:
             yield loop.line()
+        yield from (loop.margins() for loop in self.loops if loop.poles.stable)
         if math.isfinite(self.softer) and self.stiffness > 0.0:
             yield f"sticking, {100.0 * self.softer:.0f} % of the contact may be missing"
         if found := self.told_cycle:
+            # By the first harmonic of a contact that slips more and more; what slides all the time holds nothing.
+            larger = "" if self.loops[1].poles.stable else ", or a larger one, since sliding is unstable too"
             yield (
                 "sticking, the motion grows on"
                 if math.isinf(found.amplitude)
                 else f"sticking, it ends in a cycle of {1e6 * found.amplitude:.0f} µrad at {found.frequency:.0f} Hz"
+                + larger
             )
         elif self.cycle:
             yield "sticking, the motion grows to where the controller is not linear: poles do not show where it ends"
@@ -218,8 +267,21 @@ def controller_stability(axis: Axis, controller: Controller, delay: float = 0.0)
     return ControllerStability(
         tuple(f"{part}: {block.law.name}" for part, block in controller.blocks.items()),
         (sticking, sliding), axis.amplitude, drivetrain.visible, drive.sample_time, late,
-        softer, cycle, straight, frequency, -drive.response(frequency),
+        softer, cycle, held_against(axis, controller, free), straight, frequency, -drive.response(frequency),
     )  # fmt: skip
+
+
+def held_against(axis: Axis, controller: Controller, sliding: LinearController) -> float:
+    """Static friction of the contact, N·m, where the controller, here as it is while everything slides, integrates."""
+    poles = np.linalg.eigvals(sliding.state_space()[0])
+    # A law that may integrate has no such pole where its gain is 0.
+    declared = any(block.law.integrates for block in controller.blocks.values())
+    if not declared or not np.any(np.abs(poles - 1.0) < INTEGRATES):
+        return 0.0
+    try:
+        return max(static_level(axis.friction, direction) for direction in (1.0, -1.0))
+    except ParameterError:  # a law that does not say what it holds
+        return 0.0
 
 
 def straight_to(axis: Axis, controller: Controller, reach: float, *poles: Poles) -> float:
@@ -258,9 +320,10 @@ def about(
 
 def margins(name: str, drivetrain: Drivetrain, drive: LinearController) -> LoopMargins:
     """Poles, and how much more torque and delay the loop bears."""
-    poles = Loop(drivetrain, drive).poles()
+    loop = Loop(drivetrain, drive)
+    poles = loop.poles()
     if not poles.stable:
-        return LoopMargins(name, poles, (math.nan, math.nan), math.nan)
+        return LoopMargins(name, poles, (math.nan, math.nan), math.nan, math.nan, math.nan)
 
     def with_torque(factor: float) -> bool:
         return stable(drivetrain, replace(drive, factor=factor))
@@ -270,7 +333,7 @@ def margins(name: str, drivetrain: Drivetrain, drive: LinearController) -> LoopM
     late = edge(
         lambda d: stable(drivetrain, replace(drive, delay=drive.delay + d)), np.linspace(0.0, LATEST, 201)
     )
-    return LoopMargins(name, poles, (low, high), late)
+    return LoopMargins(name, poles, (low, high), late, *loop.phase_margin())
 
 
 def cycle_of(axis: Axis, controller: Controller, delay: float, first: Poles) -> Cycle | None:

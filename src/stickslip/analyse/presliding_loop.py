@@ -25,9 +25,10 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 STEPS = 64
 """Of a period, in the describing function of a law."""
-STABLE, LOOKED_AT = 1e-9, 500
-"""By which a pole may lie outside the unit circle, by rounding; frequencies up to half the sample rate, over five
-decades, at which a loop's sensitivity is looked for."""
+STABLE = 1e-9
+"""By which a pole may lie outside the unit circle, by rounding."""
+TURNS = np.geomspace(1e-5 * math.pi, math.pi, 500)
+"""Frequencies up to half the sample rate at which a loop's sensitivity and crossover are looked for, rad a sample."""
 
 
 def describing(model: Model, amplitude: float, frequency: float) -> LinearContact:
@@ -234,10 +235,35 @@ class Loop:
         if np.abs(np.linalg.eigvals(closed)).max() > 1.0 + STABLE:
             return math.inf
         # Both differ by what the measured angle feeds: det(z - closed) / det(z - opened) = 1 + L.
-        z = np.exp(1j * np.geomspace(1e-5 * math.pi, math.pi, LOOKED_AT))[:, None, None] * np.eye(len(closed))
+        z = np.exp(1j * TURNS)[:, None, None] * np.eye(len(closed))
         _, size = np.linalg.slogdet(z - closed)
         _, alone = np.linalg.slogdet(z - opened)
         return float(np.exp(np.max(alone - size)))
+
+    def opened(self, turns: Array) -> Any:
+        """The loop's transfer function L cut open, at angles in rad a sample, complex."""
+        closed, opened = self.matrix(), replace(self, measured=0.0).matrix()
+        z = np.exp(1j * turns)[:, None, None] * np.eye(len(closed))
+        sign, size = np.linalg.slogdet(z - closed)
+        sign_alone, alone = np.linalg.slogdet(z - opened)
+        return sign / sign_alone * np.exp(size - alone) - 1.0
+
+    def phase_margin(self) -> tuple[float, float]:
+        """The least angle between L and -1 where its magnitude is 1, degrees, and the frequency there, Hz; infinite
+        and NaN where it nowhere is."""
+        size = np.log(np.abs(self.opened(TURNS)))
+        crossed = np.flatnonzero(size[:-1] * size[1:] < 0.0)
+        if not crossed.size:
+            return math.inf, math.nan
+        low, high = TURNS[crossed], TURNS[crossed + 1]
+        rising = size[crossed] < 0.0
+        for _ in range(30):
+            middle = np.sqrt(low * high)
+            before = (np.abs(self.opened(middle)) < 1.0) == rising
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        left = np.degrees(np.abs(np.angle(-self.opened(low))))
+        least = int(np.argmin(left))
+        return float(left[least]), float(low[least]) / (2.0 * math.pi * self.drive.sample_time)
 
     def poles(self) -> Poles:
         """The least stable pole."""

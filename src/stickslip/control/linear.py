@@ -149,7 +149,10 @@ def place(kind: str, inertia: float, bandwidth: float, damping: float = 1.0) -> 
     inertia : float
         kg·m²
     bandwidth : float
-        Natural frequency of the poles, Hz. The PID's third pole lies at the same frequency (eq. 3.13).
+        Natural frequency of the poles, Hz. The PID's third pole lies at the same frequency (eq. 3.13). It is not the
+        frequency up to which the closed loop follows: the zeros of PD and PID bring the crossover of the gain and the
+        closed loop's -3 dB to a multiple of it, of a PID with damping 1 to some three and four times. `stability` says
+        the crossover.
     damping : float
         Damping ratio of the pair.
 

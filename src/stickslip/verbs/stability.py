@@ -34,6 +34,10 @@ def stability(
     controller holds enter by their describing functions for a motion of `amplitude`; so does the limit cycle that a
     loop ends in.
 
+    What is judged is small motion about rest. Whether an integral action against static friction sticks and slips for
+    ever (hunts) no poles tell: the result says where that may be (`held`), and a long `simulate` at rest decides it,
+    by its metric `limit_cycle_amplitude_rad`.
+
     Parameters
     ----------
     machine : Machine, RigidAxis or path
@@ -50,7 +54,8 @@ def stability(
     Returns
     -------
     ControllerStability
-        Prints as `stickslip analyse stability --controller` does; `loops` has poles and margins of both.
+        Prints as `stickslip analyse stability --controller` does; `loops` has poles of both, and their margins
+        in gain (dB), phase (degrees, with the crossover in Hz), torque and delay.
 
     Raises
     ------
