@@ -30,7 +30,7 @@ def test_sliding_knows_the_parameters_of_its_curves() -> None:
         Model("coulomb", fc=1.0, sigma2=0.1),
         Model("stribeck_plain", fs=1.2, fc=1.0, vs=0.1, sigma2=0.1),
     ]
-    refuse_unknown(Options(values={"vs": 0.1}, frozen=("fc",)), curves)
+    refuse_unknown(Options(values={"vs": 0.1, "fc": 1.0}, frozen=("fc",)), curves)
     with pytest.raises(UnknownName, match="'rubbish'"):
         refuse_unknown(Options(values={"rubbish": 3.0}), curves)
     with pytest.raises(InputError, match="leave --free fc out"):

@@ -96,7 +96,11 @@ def _law_arguments(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], metavar="NAME=VALUE", help="initial value of a parameter"
     )
     parser.add_argument(
-        "--freeze", action="append", default=[], metavar="NAME[=VALUE]", help="keep a parameter fixed"
+        "--freeze",
+        action="append",
+        default=[],
+        metavar="NAME[=VALUE]",
+        help="keep a parameter at this value (without one, at --set NAME=.. or a default)",
     )
     parser.add_argument(
         "--free",

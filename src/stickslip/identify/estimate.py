@@ -70,6 +70,26 @@ class Estimate:
         }  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A number that was given and not fitted.
+
+    Attributes
+    ----------
+    name, unit, symbol : str
+    value : float
+    """
+
+    name: str
+    unit: str
+    symbol: str
+    value: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {"name": self.name, "unit": self.unit, "symbol": self.symbol, "value": self.value}
+
+
 @dataclass(frozen=True, eq=False)
 class Trace:
     """One set of points of a picture.
@@ -142,6 +162,8 @@ class Identification:
         The method's own numbers, plain data or arrays.
     findings : tuple
         What the check of the records found, in its order.
+    held : tuple of Held
+        What the user gave, and so was not fitted.
     """
 
     method: str
@@ -154,6 +176,7 @@ class Identification:
     pictures: tuple[Picture, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict[str, Any])
     findings: tuple[Any, ...] = ()
+    held: tuple[Held, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
         for estimate in self.estimates:
@@ -205,6 +228,7 @@ class Identification:
             "model": self.model.as_dict() if self.model else None,
             "estimates": [e.as_dict() for e in self.estimates],
             "assumed": dict(self.assumed),
+            "held": [h.as_dict() for h in self.held],
             "correlation": correlation,
             "misfit": {k: float(v) for k, v in self.misfit.items()},
             "notes": list(self.notes),

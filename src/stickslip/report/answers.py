@@ -125,12 +125,12 @@ def unit_in(found: Identification, unit: str) -> str:
 
 
 def meaning_of(found: Identification) -> dict[str, str]:
-    """What every estimate is, in words, by its name; empty for one that nothing describes."""
+    """What every number, fitted or given, is in words, by its name; empty for one that nothing describes."""
     described = {p.name: p.par.meaning for p in mechanics_parameters(ServoAxis(), "torque", {}, 0, 0)}
     law = {f.name: f.par.meaning for f in found.model.law.fields} if found.model else {}
     words = OWN_WORDS | described | law
     out: dict[str, str] = {}
-    for e in found.estimates:
+    for e in (*found.estimates, *found.held):
         said = words.get(e.name.partition("[")[0].rpartition(".")[2], "")
         if linear(found):
             said = said.replace("torque", "force").replace("inertia", "mass")

@@ -13,7 +13,7 @@ from typing import Any
 from stickslip.analyse.wording import ends
 from stickslip.finding import Finding
 from stickslip.identify.axis.search import FittedAxis
-from stickslip.identify.estimate import Estimate, Identification, Picture
+from stickslip.identify.estimate import Estimate, Held, Identification, Picture
 from stickslip.record import Record
 from stickslip.report.answers import answers_of, meaning_of, one_number_each, speeds_in
 from stickslip.report.axis_evidence import judgements
@@ -116,6 +116,7 @@ def rendered(
     law = found.model.law if found.model else None
     method = found.method.replace("_", " ")
     columns, rows = comparison_of(found)
+    meanings = meaning_of(found)
     parts = {
         "data": figures(data_pictures([s.record for s in sources], [s.name for s in sources])),
         "friction": figures(law_picture), "trust": figures(torque),
@@ -130,7 +131,10 @@ def rendered(
         law=f"{law.title or law.name}" if law else "",
         answers=answers, open_loop=open_loop(found),
         tally=tally(found, sources),
-        estimates=[shown(e, meaning) for e, meaning in zip(found.estimates, meaning_of(found).values(), strict=True)],
+        estimates=[
+            *(shown(e, meanings[e.name]) for e in found.estimates),
+            *(known(h, meanings[h.name]) for h in found.held),
+        ],
         missing=one_number_each(found.estimates),
         notes=[n for n in found.notes if n not in answers.told],
         misfit=[
@@ -231,6 +235,14 @@ def shown(e: Estimate, meaning: str = "") -> dict[str, Any]:
         "name": e.name, "meaning": meaning, "unit": e.unit, "value": value, "interval": interval(e),
         "good": e.identified, "verdict": verdict, "chosen": chosen,
         "symbol": symbol(e.symbol if meaning and e.symbol != e.name else ""),
+    }  # fmt: skip
+
+
+def known(h: Held, meaning: str) -> dict[str, Any]:
+    """A number that was given as a row."""
+    return {
+        "name": h.name, "meaning": meaning, "unit": h.unit, "value": number(h.value), "interval": "-", "given": True,
+        "symbol": symbol(h.symbol if meaning else ""),
     }  # fmt: skip
 
 

@@ -42,12 +42,16 @@ def numbers_and_trust(found: Identification, answers: Answers) -> list[str]:
     """What was found, in lines."""
     law = f": law {found.model.law.name!r}" if found.model else ""
     out = [f"{found.method.replace('_', ' ')}{law}", ""]
-    width = max(16, *(len(e.name) + 2 for e in found.estimates)) if found.estimates else 16
+    width = max([16, *(len(e.name) + 2 for e in (*found.estimates, *found.held))])
     meanings = meaning_of(found)
     for e in found.estimates:
         value = f"{'not determined':<40}" if e.undetermined else f"{e.value:>12.5g}  {interval_text(e):<26}"
         verdict = "identified" if e.identified else "not identified"
         out.append(f"{e.name:<{width}}{value} {e.unit:<11} {verdict:<16}{meanings[e.name]}".rstrip())
+    for h in found.held:
+        out.append(
+            f"{h.name:<{width}}{h.value:>12.5g}  {'':<26} {h.unit:<11} {'given':<16}{meanings[h.name]}".rstrip()
+        )
     out += ["", *one_number_each(found.estimates), f"trust: {answers.trust}", *answers.evidence]
     for name, number in found.misfit.items():
         if not any(name.removeprefix("held_out_").startswith(n) for n in JUDGED):

@@ -18,7 +18,7 @@ from stickslip.config import Table
 from stickslip.errors import InputError
 from stickslip.extras import needed
 from stickslip.finding import Finding
-from stickslip.identify.estimate import Estimate, Identification, Picture
+from stickslip.identify.estimate import Estimate, Held, Identification, Picture
 from stickslip.identify.identified_file import Identified, identified_in
 from stickslip.identify.model_file import in_memory, model_content, versions, write_model
 from stickslip.identify.motion import motion_of, speeds_of
@@ -63,11 +63,16 @@ class IdentificationResult:
 
     @property
     def parameters(self) -> Mapping[str, Estimate]:
-        """Every number by name: ``value``, ``unit``, ``interval`` (95 %), ``identified``, ``verdict``.
+        """Every fitted number by name: ``value``, ``unit``, ``interval`` (95 %), ``identified``, ``verdict``.
 
-        ``verdict`` says why a number is not identified, and is empty where it is.
+        ``verdict`` says why a number is not identified, and is empty where it is. `given` has the other numbers.
         """
         return MappingProxyType({e.name: e for e in self.identification.estimates})
+
+    @property
+    def given(self) -> Mapping[str, float]:
+        """What was held at a value that you gave (`inertia`, `frozen`), by name."""
+        return MappingProxyType({h.name: h.value for h in self.identification.held})
 
     @property
     def model(self) -> Model:
@@ -291,7 +296,8 @@ class IdentificationResult:
 
     def _repr_html_(self) -> str:
         """A table in a notebook, and what it is worth."""
-        rows = "".join(_row(e) for e in self.identification.estimates)
+        cells = [*map(_cells, self.identification.estimates), *map(_given, self.identification.held)]
+        rows = "".join(f"<tr>{''.join(f'<td>{escape(c)}</td>' for c in row)}</tr>" for row in cells)
         law = f": law {self.identification.model.law.name}" if self.identification.model else ""
         head = "".join(f"<th>{h}</th>" for h in ("parameter", "value", "95 % interval", "unit", "verdict"))
         more = "".join(f"<li>{escape(s)}</li>" for s in (*self.evidence, *self.answers.friction))
@@ -302,10 +308,13 @@ class IdentificationResult:
         )
 
 
-def _row(e: Estimate) -> str:
+def _given(h: Held) -> tuple[str, ...]:
+    return h.name, f"{h.value:.5g}", "", h.unit, "given"
+
+
+def _cells(e: Estimate) -> tuple[str, ...]:
     value = "not determined" if e.undetermined or math.isnan(e.value) else f"{e.value:.5g}"
     verdict = (
         "identified" if e.identified else f"not identified: {e.verdict or 'the data do not determine it'}"
     )
-    cells = (e.name, value, interval_text(e), e.unit, verdict)
-    return "<tr>" + "".join(f"<td>{escape(c)}</td>" for c in cells) + "</tr>"
+    return e.name, value, interval_text(e), e.unit, verdict

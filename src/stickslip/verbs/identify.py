@@ -18,6 +18,7 @@ from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import Diagnosis
 from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.experiment import DRIVES
+from stickslip.identify.held import held_in
 from stickslip.identify.methods import method_named
 from stickslip.identify.methods.method import Method, Options
 from stickslip.identify.on_a_line import along_a_line, worded
@@ -196,7 +197,8 @@ def with_notes(
         *(weight_notes(found, records) if options.pendulum else ()),
         *more,
     )
-    return replace(found, notes=(*found.notes, *said))
+    held = held_in(found, options.frozen, options.values)
+    return replace(found, notes=(*found.notes, *said), held=held)
 
 
 def refused_for(method: str, holds_out: bool, threshold: float | None, hold_out: bool, over: bool) -> None:

@@ -16,9 +16,10 @@ from stickslip.identify.axis.problem import mechanics_parameters
 from stickslip.identify.axis.search import LEVELS, Extras, require_known
 from stickslip.identify.estimate import Identification
 from stickslip.identify.experiment import Experiment
+from stickslip.identify.fit.axis_start import frozen_by_default
 from stickslip.identify.methods._experiments import driven, experiments_of
 from stickslip.identify.methods._play import with_dead_travel
-from stickslip.identify.methods.method import Method, Options, law_of
+from stickslip.identify.methods.method import Method, Options, law_of, refuse_unsaid
 from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
@@ -74,7 +75,8 @@ def refuse_for_every_law(axis: ServoAxis, experiments: Sequence[Experiment], opt
     Raises
     ------
     InputError
-        If an inertia is given that is not positive, or a parameter is named that neither a law nor the axis has.
+        If an inertia is given that is not positive, a parameter is named that neither a law nor the axis has, or one
+        is to be held that has no value.
     """
     inertia = options.values.get("inertia", 1.0)
     if not inertia > 0.0:
@@ -85,6 +87,9 @@ def refuse_for_every_law(axis: ServoAxis, experiments: Sequence[Experiment], opt
     # One direction's own parameters, and torques over the position, are known where they are searched for.
     plain = [n for n in names if not n.endswith(NEGATIVE) and not n.startswith(("cos", "sin", "friction_"))]
     require_known(plain, known)
+    neutral = {"drive_gain", "back_emf", "backlash", "controller_gain", "load_motor", "load_external"}
+    own = {name for x in options.laws or AUTOMATIC for name in frozen_by_default(law_of(x))}
+    refuse_unsaid(options, neutral | own)
 
 
 METHOD = Method("axis", "inertia, offset or gravity and friction jointly", identify, driven, holds_out=True)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Literal
 
 from stickslip import plugins
+from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.regression.regression import regress_axis
@@ -173,6 +174,28 @@ class Method:
                     raise InputError(
                         f"--method {self.name} has no {name!r} for --{option}{takes}; leave it out"
                     )
+
+
+def refuse_unsaid(options: Options, known: Set[str]) -> None:
+    """Refuse to hold a parameter at a value that nobody gave: it would be one where a search starts.
+
+    Parameters
+    ----------
+    options : Options
+    known : set of str
+        Names of what has a value of its own.
+
+    Raises
+    ------
+    InputError
+    """
+    given = {n for name in options.values for n in (name, name.partition("[")[0])} | known
+    unsaid = [
+        n for n in options.frozen if given.isdisjoint((n, n.partition("[")[0], n.removesuffix(NEGATIVE)))
+    ]
+    if unsaid:
+        settings = " and ".join(f"--set {name}=.." for name in unsaid)
+        raise InputError(f"{', '.join(unsaid)} cannot be held without a value; give {settings}")
 
 
 def law_of(given: str | Law) -> Law:

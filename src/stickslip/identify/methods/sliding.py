@@ -10,9 +10,9 @@ import numpy as np
 
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.estimate import Identification
-from stickslip.identify.fit.axis_start import each_way, starts
+from stickslip.identify.fit.axis_start import each_way, frozen_by_default, starts
 from stickslip.identify.methods._records import has_torque, torque_channel
-from stickslip.identify.methods.method import Method, Options, law_of
+from stickslip.identify.methods.method import Method, Options, law_of, refuse_unsaid
 from stickslip.identify.sliding.choice import candidates, choose_sliding
 from stickslip.identify.sliding.curve import Array, identify_sliding
 from stickslip.identify.sliding.offset import beside, constant_torque, without
@@ -49,7 +49,8 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
 
 
 def refuse_unknown(options: Options, templates: Iterable[Model]) -> None:
-    """Refuse names of parameters that none of the curves has, and to free what is free anyway.
+    """Refuse names of parameters that none of the curves has, and to free what is free anyway, or to hold what
+    has no value.
 
     Raises
     ------
@@ -63,6 +64,7 @@ def refuse_unknown(options: Options, templates: Iterable[Model]) -> None:
         raise InputError(
             f"--method sliding fits every parameter; leave --free {name} out, or --freeze the others"
         )
+    refuse_unsaid(options, {n for model in templates for n in frozen_by_default(model.law)})
 
 
 def template(law: Law, velocity: Array, torque: Array, options: Options) -> Model:
