@@ -17,7 +17,7 @@ from stickslip.config import Table, read_toml
 from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
 from stickslip.references.through_points import velocities_through
 from stickslip.spec import Law, ReferenceKind
-from stickslip.values import Vector, call_of
+from stickslip.values import Vector, call_of, unmasked
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -317,7 +317,7 @@ def column(name: str, values: Vector, unit: str, rows: int = 0) -> Array:
     ParameterError
     """
     try:
-        found: Array = np.asarray(values, dtype=np.float64)
+        found: Array = np.asarray(unmasked(values), dtype=np.float64)
     except (TypeError, ValueError):
         raise ParameterError(
             f"table: {name} holds what is no number; give one number a point, in {unit}"

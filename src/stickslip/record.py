@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+ZIP = b"PK"
+"""How an .npz file begins."""
+
 
 @constructor_named
 @dataclass(frozen=True, eq=False)
@@ -115,8 +118,13 @@ class Record:
 
         try:
             with open(path, "rb") as file:
-                if file.read(len(stream.MAGIC)) == stream.MAGIC:
-                    return cls(*stream.load(path))
+                begin = file.read(max(len(stream.MAGIC), len(ZIP)))
+            if begin.startswith(stream.MAGIC):
+                return cls(*stream.load(path))
+            if not begin.startswith(ZIP):
+                raise ValueError(
+                    "what `save` writes is an .npz file; logs of other formats are for `ss.read`"
+                )
             with np.load(path, allow_pickle=False) as data:
                 units, meta = _header(str(data["__header__"]))
                 values = {k: _real(k, data[k]) for k in data.files if k != "__header__"}

@@ -15,6 +15,27 @@ Vector = Annotated[ArrayLike, NUMBERS]
 """An array, a list, a data frame's column, ..., of numbers: an annotation that type checkers take for `ArrayLike`."""
 
 
+def is_masked(values: object) -> bool:
+    """Whether it is a masked array of NumPy's."""
+    return isinstance(values, np.ma.MaskedArray)
+
+
+def unmasked(values: Any) -> np.ndarray[Any, Any]:
+    """An array, what is masked of it being missing: NaN, or a date that is none.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If something is masked of what is no number and no date.
+    """
+    if not is_masked(values) or not np.ma.getmaskarray(values).any():
+        return np.asarray(values)
+    masked: Any = values
+    if masked.dtype.kind in "mM":
+        return np.asarray(masked.filled(np.array("NaT", masked.dtype)))
+    return np.asarray(masked.astype(complex if masked.dtype.kind == "c" else float).filled(np.nan))
+
+
 def call_of(name: str, first: Sequence[object], named: Iterable[tuple[str, object]]) -> str:
     """A call as code: what is given by its place, then by its name."""
     said = [*(text_of(value) for value in first), *(f"{key}={text_of(value)}" for key, value in named)]

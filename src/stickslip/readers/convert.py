@@ -122,7 +122,7 @@ def convert(
     time, origin, more = time_of(table, by_role, columns, sample_time)
     said += more
     if time.size == 0:
-        raise InputError("the file has no rows; give a record with samples")
+        raise InputError("there are no rows; give a record with samples")
     channels: dict[str, Array] = {}
     units: dict[str, str] = {}
     listed: list[dict[str, Any]] = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -15,6 +15,7 @@ from stickslip.readers._units import SI, parse_unit
 from stickslip.readers.convert import LINEAR
 from stickslip.readers.table_columns import Column, Table
 from stickslip.rules import with_article
+from stickslip.values import is_masked, unmasked
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -48,6 +49,10 @@ def table_of_signals(
             raise InputError(f"{said} has shape {numbers.shape}; give one number a sample, shape (n,)")
         columns.append(Column(name, numbers))
     lengths = {c.name: c.values.size for c in columns}
+    if not any(lengths.values()):
+        raise InputError(
+            f"{arguments.get(columns[0].name, columns[0].name)} is empty; give one number a sample"
+        )
     if len(set(lengths.values())) > 1:
         listed = ", ".join(f"{arguments.get(name, name)} {size}" for name, size in lengths.items())
         raise InputError(f"the arrays differ in length ({listed}); give one number a sample in each")
@@ -76,10 +81,11 @@ def numbers_of(name: str, values: Any) -> Array:
         If they are none.
     """
     try:
-        given = np.asarray(values)
+        given = unmasked(values)
         if given.dtype.kind in "mM":
-            return np.asarray((given - given[:1]) / np.timedelta64(1, "s"), dtype=np.float64)
-        if given.dtype.kind != "c":
+            first = given[~np.isnat(given)][:1]
+            return np.asarray((given - first) / np.timedelta64(1, "s"), dtype=np.float64)
+        if given.dtype.kind not in "bc":
             return np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
         pass
@@ -101,9 +107,12 @@ def table_in_memory(data: Any) -> Table:
         )
     tree = data
     if hasattr(data, "columns") and hasattr(data, "to_numpy"):
-        tree = {str(name): data[name].to_numpy() for name in data.columns}
-        if data.index.name is not None:  # a plain row number says nothing
-            tree = {str(data.index.name): data.index.to_numpy(), **tree}
+        refuse_the_same_name([str(name) for name in data.columns])
+        tree = {str(name): array_of(data[name]) for name in data.columns}
+        if name := name_of(data.index):
+            tree = {name: array_of(data.index), **tree}
+    elif is_masked(data) and data.dtype.names:
+        tree = {name: data[name] for name in data.dtype.names}
     if isinstance(tree, Mapping):
         tree = {str(name): _plain(x) for name, x in cast("Mapping[Any, Any]", tree).items()}
     table = table_of(FORMAT, tree)
@@ -115,14 +124,43 @@ def table_in_memory(data: Any) -> Table:
     return table
 
 
+def refuse_the_same_name(names: Sequence[str]) -> None:
+    """Refuse two columns of one name: which of them is meant, nobody can say.
+
+    Raises
+    ------
+    InputError
+    """
+    twice = next((name for name in names if names.count(name) > 1), "")
+    if twice:
+        raise InputError(
+            f"log: {names.count(twice)} columns are called {twice!r}; leave out all but one, or rename them"
+        )
+
+
+def name_of(index: Any) -> str:
+    """What the index of a data frame is called: dates need no name to be times; a plain row number says nothing."""
+    if index.name is not None:
+        return str(index.name)
+    return "time" if index.dtype.kind in "mM" else ""
+
+
+def array_of(column: Any) -> Any:
+    """A column as NumPy's array; dates of a time zone, too, as dates."""
+    if getattr(column.dtype, "tz", None) is not None:
+        column = getattr(column, "dt", column).tz_convert(None)
+    return column.to_numpy()
+
+
 def _plain(values: Any) -> Any:
     """Arrays of whatever library as NumPy's, dates and durations in s; anything else as it is."""
     if not hasattr(values, "__array__"):
         return values
-    numbers: np.ndarray[Any, Any] = np.asarray(values)
+    numbers = unmasked(values)
     if numbers.dtype.kind not in "Mm":
         return numbers
-    return numbers.astype(f"{numbers.dtype.kind}8[ns]").astype(np.int64) * 1e-9
+    seconds = numbers.astype(f"{numbers.dtype.kind}8[ns]").astype(np.int64) * 1e-9
+    return np.where(np.isnat(numbers), np.nan, seconds)
 
 
 def digest_of(table: Table) -> str:
