@@ -33,7 +33,7 @@ def public(module: str, name: str) -> Any:
 
 def callables(module: str, name: str) -> list[tuple[str, Any, str]]:
     """A function, or a class and its public methods, each with the docstring that has to name its parameters."""
-    found = public(module, name)
+    found = inspect.unwrap(public(module, name))
     if not inspect.isclass(found):
         return [(name, found, inspect.getdoc(found) or "")]
     # "Its arguments are those of `Par`."

@@ -2,9 +2,9 @@
 
 From a log to a compensator: `read`, `doctor`, `identify`, `compare`, `recommend`, `export`. Simulation: `Model`,
 `RigidAxis`, `load_machine`, `Machine` and its parts (`Contact`, `FlexibleAxis`, `Encoder`, ...), `Controller`,
-`Reference`, `simulate`, `respond`, `stability`. Many runs: `study`, `sweep`,
-`tune`, `learn`. Each has its own help, `help(stickslip.identify)`; `identify`, `recommend`, `export`, `study` and
-`sweep` are packages as well, and so stand under PACKAGE CONTENTS rather than FUNCTIONS.
+`Reference`, `simulate`, `respond`, `stability`. Many runs: `study`, `sweep`, `tune`, `learn`. `warm_up` compiles
+everything in advance. Each has its own help, `help(stickslip.identify)`; `identify`, `recommend`, `export`, `study`
+and `sweep` are packages as well, and so stand under PACKAGE CONTENTS rather than FUNCTIONS.
 
 The public names below are loaded when first used, so that importing the package costs nothing.
 """
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stickslip.approval import allow_code
+    from stickslip.cli.warm_up import warm_up
     from stickslip.control.block import ControlBlock
     from stickslip.control.compensator import Feedback, Feedforward
     from stickslip.control.controller import Controller
@@ -58,6 +59,7 @@ _HOME = {
     name: module
     for module, names in {
         "approval": "allow_code",
+        "cli.warm_up": "warm_up",
         "control.block": "ControlBlock",
         "control.compensator": "Feedback Feedforward",
         "control.controller": "Controller",
@@ -150,6 +152,7 @@ __all__ = [
     "study",
     "sweep",
     "tune",
+    "warm_up",
 ]
 
 
@@ -161,22 +164,25 @@ class _Room(ModuleType):
     """A package that, called, is the function of its name."""
 
     @property
-    def _function(self) -> Any:
+    def __wrapped__(self) -> Any:
         name = self.__name__.rpartition(".")[2]
         return getattr(importlib.import_module(f"stickslip.{_ROOMS[name]}"), name)
 
     def __call__(self, *args: Any, **options: Any) -> Any:
-        return self._function(*args, **options)
+        return self.__wrapped__(*args, **options)
 
     @property
     def __doc__(self) -> str | None:  # type: ignore[reportIncompatibleVariableOverride]
-        return self._function.__doc__
+        # What `help` shows of a module is this text alone.
+        from stickslip.call_text import call_in
+
+        return call_in(self.__wrapped__)
 
     @property
     def __signature__(self) -> Any:
         import inspect
 
-        return inspect.signature(self._function)
+        return inspect.signature(self.__wrapped__)
 
 
 class _Package(ModuleType):
@@ -202,4 +208,6 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+    """What is public: no helper of this file, and no name that it imports for itself."""
+    rooms = [n for n, x in globals().items() if getattr(x, "__name__", "") == f"{__name__}.{n}"]
+    return sorted({*(n for n in globals() if n.startswith("__")), *rooms, *__all__})

@@ -5,9 +5,9 @@ from __future__ import annotations
 import inspect
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, cast, overload
 
 import numpy as np
 
@@ -147,6 +147,43 @@ class Model:
                 raise ParameterError(f"{self.law.name}: no parameter {name!r}; {suggestion(name, values)}")
             values[name] = _times(factor, values[name])
         return Model(self.law, **values)
+
+    @overload
+    def sliding_torque(self, velocity: float) -> float: ...
+    @overload
+    def sliding_torque(self, velocity: Iterable[float]) -> Array: ...
+    @arguments_checked
+    def sliding_torque(self, velocity: float | Vector) -> float | Array:
+        """Friction torque at constant velocity, when everything that moves in the contact has settled.
+
+        Parameters
+        ----------
+        velocity : float or array_like
+            rad/s (m/s); of either sign.
+
+        Returns
+        -------
+        float or array
+            N·m (N) against the motion, of the velocity's shape; at rest 0, where the contact withstands any torque up
+            to break-away.
+
+        Raises
+        ------
+        ParameterError
+            If the law says no torque at constant velocity, or a velocity is not finite.
+        """
+        steady = self.law.steady
+        if steady is None:
+            raise ParameterError(
+                f"{self.law.name}: says no torque at constant velocity; simulate a motion with "
+                "`stickslip.respond(model, reference, times)`"
+            )
+        given = np.asarray(unmasked(velocity), dtype=np.float64)
+        odd = given[~np.isfinite(given)]
+        if odd.size:
+            raise ParameterError(f"sliding_torque: velocity = {odd[0]:g} rad/s must be finite")
+        out = np.array([steady(v, self.parameters) if v else 0.0 for v in given.reshape(-1).tolist()])
+        return out.reshape(given.shape) if given.ndim else float(out[0])
 
     def as_dict(self) -> dict[str, Any]:
         """Law, choices and parameters as plain data."""

@@ -142,6 +142,7 @@ def calls() -> dict[str, Call]:
         "Model.from_table": Call(ss.Model.from_table, {"table": table}),
         "Model.having": Call(LAW.having, {"slip_rule": "signed"}),
         "Model.scaled": Call(LAW.scaled, {"fc": 1.1}),
+        "Model.sliding_torque": Call(LAW.sliding_torque, {"velocity": [0.0, 1.0]}),
         "Model.warn": Call(LAW.warn),
         "Par": Call(ss.Par, own(par)),
         "RecommendationResult": Call(
@@ -187,6 +188,7 @@ def calls() -> dict[str, Call]:
         "stability": Call(ss.stability, {"machine": "thesis-dry", "controller": SAMPLED}),
         "study": Call(ss.study, {"file": STUDY}),
         "sweep": Call(ss.sweep, {"file": SWEEPS / "small.toml"}),
+        "warm_up": Call(ss.warm_up, {"tell": print}),
         "tune": Call(ss.tune, {"file": SWEEPS / "small_tune.toml"}),
     }  # fmt: skip
 
@@ -225,7 +227,7 @@ def _no_work(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         "verbs.compare.read_identified", "verbs.sweep.execute.run", "verbs.tune.search", "verbs.study.studies.run",
         "verbs.learn._over_time", "verbs.learn._over_angle", "verbs.identification.prepared_folder",
         "verbs.recommendation.prepared_folder", "verbs.learn.prepared_folder", "verbs.export.prepared_folder",
-        "verbs.identification.answers_of", "verbs.sweep.dataset.read",
+        "verbs.identification.answers_of", "verbs.sweep.dataset.read", "cli.warm_up.failures",
     ):  # fmt: skip
         monkeypatch.setattr(f"stickslip.{place}", reached)
     monkeypatch.setattr("stickslip.verbs.examiner.examine", lambda record, **_: Diagnosis((), record))

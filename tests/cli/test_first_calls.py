@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import stickslip
 from stickslip import compiling, jit
 from stickslip.cli import main, parser_of, sweep, warm_up
 from stickslip.sweep import forecast
@@ -89,6 +90,18 @@ def test_warm_up_runs_small_pieces_of_the_verbs(monkeypatch, capsys, tmp_path):
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith("1/2 laws ... ")
     assert "failed: stickslip: unknown law" in said[1]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_library_warms_up_as_the_command_does(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    told: list[str] = []
+    monkeypatch.setattr(warm_up, "STEPS", {"laws": ("laws",), "version": ("version",)})
+    stickslip.warm_up(told.append)
+    assert [line.partition(" ... ")[0] for line in told] == ["1/2 laws", "2/2 version"]
+    monkeypatch.setattr(warm_up, "STEPS", {"nothing": ("law", "no-such-law")})
+    with pytest.raises(stickslip.StickslipError, match="nothing: stickslip: unknown law 'no-such-law'"):
+        stickslip.warm_up(told.append)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -14,8 +14,11 @@ import io
 import os
 import tempfile
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
+
+from stickslip.arguments import arguments_checked
+from stickslip.errors import StickslipError
 
 SUMMARY = "compile everything once after installation"
 STEPS: dict[str, Sequence[str]] = {
@@ -77,23 +80,59 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the steps; say what each took. 1 if one failed."""
     from stickslip import compiling
-    from stickslip.cli import main
 
     compiling.silence()  # it is what this verb says itself
-    failed = 0
+    return 1 if failures(lambda text, end: print(text, end=end, flush=True)) else 0
+
+
+@arguments_checked
+def warm_up(tell: Callable[[str], None] = print) -> None:
+    """Compile everything in advance, as `stickslip warm-up` does, so that later calls start without delay.
+
+    The compiled code is kept in the user's cache folder (or STICKSLIP_CACHE), for later processes too. It takes a
+    minute or two after an installation, and some seconds where nothing is left to compile. Until it returns, the
+    process works in a temporary folder.
+
+    Parameters
+    ----------
+    tell : callable
+        Is told what was compiled and how long it took, a line each.
+
+    Raises
+    ------
+    StickslipError
+        If something could not be compiled: what, and why.
+    """
+    line = ""
+
+    def say(text: str, end: str) -> None:
+        nonlocal line
+        line += text + end
+        if end == "\n":
+            tell(line.rstrip())
+            line = ""
+
+    if failed := failures(say):
+        raise StickslipError(f"not everything is compiled: {'; '.join(failed)}")
+
+
+def failures(say: Callable[[str, str], None]) -> list[str]:
+    """Run the steps; what failed of them. `say` is given a text and how it ends."""
+    from stickslip.cli import main
+
+    failed: list[str] = []
     with tempfile.TemporaryDirectory(prefix="stickslip-warm-up-") as folder, inside(folder):
         for name, text in FILES.items():
             Path(name).write_text(text, encoding="utf-8")
         for i, (what, words) in enumerate(STEPS.items(), 1):
-            print(f"{i}/{len(STEPS)} {what} ...", end=" ", flush=True)
+            say(f"{i}/{len(STEPS)} {what} ...", " ")
             begin, heard = time.perf_counter(), io.StringIO()
             with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(heard):
                 code = main(words)
-            print(
-                f"{time.perf_counter() - begin:.0f} s" if code == 0 else f"failed: {heard.getvalue().strip()}"
-            )
-            failed += code != 0
-    return 1 if failed else 0
+            why = heard.getvalue().strip()
+            say(f"{time.perf_counter() - begin:.0f} s" if code == 0 else f"failed: {why}", "\n")
+            failed += [f"{what}: {why}"] if code else []
+    return failed
 
 
 @contextlib.contextmanager

@@ -110,9 +110,33 @@ def identify(
         and a reference in the log the closed loop is simulated. One for all logs, or one each.
     loop_output : {"torque", "current", "voltage"}, optional
         What its output is where no drive signal is recorded.
-    inverse, per_direction, pendulum, drive_gain, resistance, extra_torque, torque_is, delay, harmonics, \
-position_map, load, intervals, robust
-        As in `stickslip.identify.methods.method.Options`.
+    inverse : bool
+        Linear least squares only, no simulation (axis).
+    per_direction : bool
+        Friction with parameters of its own for each direction (axis, sliding).
+    pendulum : bool
+        Gravity is m g l sin(q - q0), otherwise a constant torque (axis).
+    drive_gain : float, optional
+        Torque per unit of the drive's signal.
+    resistance : float, optional
+        Of the motor, ohm, where a voltage drives it.
+    extra_torque : str
+        Channel of a known torque that is added to the recorded one.
+    torque_is : {"commanded", "actual", "mean"}, optional
+        What the torque's column holds: the command from this row to the next, the value at the row, or the mean over
+        the row before.
+    delay : float, optional
+        s from then until it acts; None: when it acted is found from the record.
+    harmonics : int
+        Of a torque over the position (axis).
+    position_map : bool
+        Whether a map over the angle, orders chosen by the records, is found and taken out first (axis).
+    load : bool
+        Friction that grows with the load of the gearing (axis).
+    intervals : {"prediction", "covariance"}
+        From the prediction error, or the narrower ones of the simulation's fit (axis).
+    robust : bool
+        Outliers count linearly in the output error (axis).
     accept : sequence of str
         Codes of errors of the doctor that count as warnings, since you know better.
     progress, tell : callable
