@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import stickslip as ss
 from stickslip.errors import Divergence, InputError, ParameterError
@@ -217,3 +218,55 @@ def test_a_contact_that_creeps_before_it_breaks_away_is_resolved_by_default():
     apart = np.abs(usual["position"] - fine["position"])
     assert np.ptp(fine["position"]) > 0.01  # it has broken away
     assert apart.max() < 2e-5
+
+
+@pytest.mark.parametrize("tolerance", [1e-7, 1e-9])
+@pytest.mark.parametrize("law", ["lugre", "dahl"])
+def test_an_axis_that_moves_at_the_start_is_damped_from_there_on(law: str, tolerance: float) -> None:
+    """The torque of the first sub-step ran on from 0: 3e-6 rad, whatever the tolerance."""
+    curve = {"fs": 0.335, "vs": 0.05, "sigma1": 0.1} if law == "lugre" else {}
+    friction = ss.Model(law, sigma0=1e3, fc=0.285, sigma2=0.018, **curve)
+    controller, start = ss.Controller(GAINS, sample_time=1e-3), (0.0, 2.0)
+    still = ss.Reference.table([0.0, 1.0], [0.0, 0.0])
+    axis = ss.simulate(
+        ss.RigidAxis(INERTIA, friction), controller, still, 0.05, initial=start, tolerance=1e-12
+    )
+    run = ss.simulate(
+        ideal(friction), controller, still, 0.05, initial=start, tolerance=tolerance, check=True
+    )
+    there = axis["position"][axis["event"] == 0.0]
+    apart = np.abs(run["position"] - there)
+    assert apart[1] < max(tolerance, 1e-8)
+    assert apart.max() < 2.0 * run.meta["accuracy"]["error_rad"]
+    assert run["friction_torque"][0] == pytest.approx(axis["friction_torque"][0], rel=1e-9)
+
+
+def test_the_first_sample_of_a_moving_axis_is_that_of_its_differential_equations() -> None:
+    s0, s1, s2, fc, fs, vs = 1e3, 0.1, 0.018, 0.285, 0.335, 0.05
+    friction = ss.Model("lugre", sigma0=s0, sigma1=s1, sigma2=s2, fc=fc, fs=fs, vs=vs)
+
+    def rates(_: float, y: Any) -> list[float]:
+        _, v, z = y
+        dz = v - s0 * abs(v) / (fc + (fs - fc) * math.exp(-((v / vs) ** 2))) * z
+        return [v, -(s0 * z + s1 * dz + s2 * v) / INERTIA, dz]
+
+    exact = solve_ivp(rates, (0.0, 1e-3), [0.0, 2.0, 0.0], "DOP853", rtol=1e-12, atol=1e-15).y[0, -1]
+    still = ss.Reference.table([0.0, 1.0], [0.0, 0.0])
+    for tolerance in (1e-7, 1e-10):
+        run = ss.simulate(
+            ideal(friction), ss.Controller(GAINS), still, 1e-3, initial=(0.0, 2.0), tolerance=tolerance
+        )
+        assert abs(run["position"][1] - exact) < max(tolerance, 1e-8)
+
+
+def test_what_the_shortest_sub_steps_are_wrong_by_is_told() -> None:
+    """Two runs that both end at the shortest sub-steps agreed to 1e-11 rad, and were wrong by 6e-10."""
+    friction = ss.Model("dahl", sigma0=1e3, fc=0.285, sigma2=0.018)
+    controller = ss.Controller(ss.place("PD", 4e-4, 12.0), sample_time=1e-3)
+    still = ss.Reference.table([0.0, 1.0], [0.0, 0.0])
+    more = {"initial": (0.02, 0.0), "tolerance": 1e-12}
+    axis = ss.simulate(ss.RigidAxis(4e-4, friction), controller, still, 0.05, **more)
+    run = ss.simulate(Machine("m", 4e-4, Contact(friction)), controller, still, 0.05, check=True, **more)
+    error = np.abs(run["position"] - axis["position"][axis["event"] == 0.0]).max()
+    assert error > 1e-10
+    assert error < run.meta["accuracy"]["error_rad"] < 30.0 * error

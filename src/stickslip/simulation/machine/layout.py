@@ -11,6 +11,7 @@ import numpy as np
 from stickslip.jit import compiled_law, flat, kernel
 from stickslip.machines.drivetrain import INPUTS, Flow, StateSpace
 from stickslip.machines.machine import Machine
+from stickslip.simulation.machine.contact import torque_after
 from stickslip.simulation.machine.held_tables import NODES, WATCHED, pace_of, tables, terms_of
 from stickslip.simulation.machine.held_tables import RESOLVED as RESOLVED_EVENTS
 from stickslip.simulation.machine.movers import mover
@@ -199,7 +200,7 @@ def write_numbers(n: Any, machine: Machine, places: dict[str, int], tolerance: f
     finer = max(math.sqrt(TOLERANCE / tolerance), 1.0)
     values = {
         **places, "ripples": len(contact.ripple.order), "cogs": len(machine.cogging.order),
-        "coarsest": min(halvings(bearing_parts(machine, finer)), FINEST), "seed": machine.seed,
+        "coarsest": min(halvings(bearing_parts(machine, finer)), FINEST), "finest": FINEST, "seed": machine.seed,
         "delay": math.floor(math.ldexp(machine.delay, FINEST) + 0.5), "sample_time": machine.sample_time,
         "torque_constant": amplifier.torque_constant, "current_limit": min(amplifier.current_limit, 1e300),
         "command_step": amplifier.command.step, "monitor_step": amplifier.monitor.step,
@@ -268,3 +269,12 @@ def stand_at(laid: Laid, position: float, velocity: float = 0.0) -> None:
     for place in {int(n[k]) for k in ("rotor", "shaft", "disk")} | {int(n["mode"])} - {0}:
         laid.axis[place], laid.axis[place + 1] = position, velocity
     stand_train(laid.train, position)
+    if velocity != 0.0:
+        resist(laid, velocity)
+
+
+@kernel()
+def resist(laid: Laid, velocity: float) -> None:
+    """Let the contact's damping act from the first moment on: the torque of a sub-step runs on from the one before."""
+    plant = plant_of(laid)
+    plant.now.friction = torque_after(plant, velocity, velocity, 0.0, plant.machine.states)

@@ -7,6 +7,7 @@ between the samples its position is the cubic through positions and velocities o
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import Any, cast
@@ -29,6 +30,7 @@ from stickslip.simulation.case_arrays import ruled, ruled_in, slip_rules
 from stickslip.simulation.compiled_controller import Sampled, compiled
 from stickslip.simulation.machine.drive import COLUMNS, TRIPPED, UNITS, Loop, Output, drive
 from stickslip.simulation.machine.layout import TOLERANCE, lay_out_machine, stand_at
+from stickslip.simulation.machine.plant import FINEST
 from stickslip.simulation.metrics import metrics, settle_band_of
 from stickslip.simulation.no_torque import no_torque
 from stickslip.simulation.train.layout import cannot_locate
@@ -50,6 +52,7 @@ LEAST = 0.01
 READ, EXACT = 100.0, 0.1
 """Of a run's tolerance, that a sub-step may be wrong by: where the loop reads counts of an encoder, which are coarser
 by far; and where it reads the position itself. A contact that creeps before it breaks away makes 1e4 of an error."""
+AT = COLUMNS.index("position")
 ON_TIME = 1e-6
 """Samples by which output times may lie beside a sample."""
 
@@ -76,7 +79,7 @@ def simulate_machine(
     check : bool
         Whether the run is repeated at a thousandth of the tolerance, at most of the usual one (the noise is the same):
         ``meta["accuracy"]`` then says by how much both differ at most, ``error_rad``, a hundredth of the tolerance at
-        least.
+        least. Where the shortest sub-steps do not keep that, what sub-steps twice as long change is added.
     tolerance : float
         Error in position that a sub-step may make by the end of its sample, rad; a located flow's step a tenth of it.
 
@@ -93,12 +96,14 @@ def simulate_machine(
         own = replace(machine, contact=replace(machine.contact, friction=friction))
     control, told = sampled_on(controller, machine, slip_rule)
     places = rows_at(output, machine.sample_time, duration)
-    runs = [_run(own, control, reference, duration, places, initial, tolerance, metered)]
+    asked = (own, control, reference, duration, places, initial)
+    runs = [_run(*asked, tolerance, metered)]
     substeps = int(runs[0].laid.now["taken"])
     if check and runs[0].code == 0:
-        runs.append(
-            _run(own, control, reference, duration, places, initial, FINER * min(tolerance, TOLERANCE), False)
-        )
+        finer = FINER * min(tolerance, TOLERANCE)
+        runs.append(_run(*asked, finer, False))
+        if runs[1].laid.now["short"]:
+            runs.append(_run(*asked, finer, False, FINEST - 1))
     meta: dict[str, Any] = {
         "what": "simulation", "version": stickslip.__version__, "integrator": "machine", "slip_rule": slip_rule,
         "slip_rules": slip_rules(friction=own.contact.friction, **told.pop("laws")),
@@ -129,17 +134,20 @@ def sub_step_tolerance(machine: Machine, tolerance: float) -> float:
 def _results(runs: list[_Ran], tolerance: float, metered: bool) -> dict[str, Any]:
     """How far two runs lie apart, where there are two, and the metrics of the first."""
     out: dict[str, Any] = {}
-    if len(runs) == 2:
-        both = min(len(run.rows) for run in runs)
-        apart = np.abs(runs[0].rows[:both, 3] - runs[1].rows[:both, 3])
-        if runs[1].code:  # What the finer run did not come through is not known to be right.
-            apart = np.array([np.inf])
-        least = LEAST * float(tolerance)
-        out["accuracy"] = {"error_rad": max(SURE * float(np.max(apart, initial=0.0)), least)}
+    if len(runs) > 1:
+        apart = math.fsum(_apart(one, other) for one, other in itertools.pairwise(runs))
+        out["accuracy"] = {"error_rad": max(SURE * apart, LEAST * float(tolerance))}
     if metered and runs[0].code == 0:
         turns = turning_points(runs[0].meter, runs[0].turns)
         out["metrics"] = {k: float(v) for k, v in metrics(runs[0].meter, turns).items()}
     return out
+
+
+def _apart(one: _Ran, other: _Ran) -> float:
+    """Largest distance of two runs, rad; what a repeated run did not come through is not known to be right."""
+    if other.code:
+        return math.inf
+    return float(np.max(np.abs(one.rows[:, AT] - other.rows[:, AT]), initial=0.0))
 
 
 def sampled_on(
@@ -215,9 +223,11 @@ class _Ran:
 def _run(
     machine: Machine, control: Sampled, reference: Reference, duration: float,
     places: np.ndarray[Any, np.dtype[np.int64]], initial: tuple[float, float], tolerance: float, metered: bool,
+    finest: int = FINEST,
 ) -> _Ran:  # fmt: skip
-    """One run from rest in the contact."""
+    """One run from rest in the contact, whose sub-steps are halved so often at most."""
     laid = lay_out_machine(machine, tolerance)
+    laid.machine["finest"] = finest
     stand_at(laid, *initial)
     samples = math.floor(duration / machine.sample_time * (1.0 + 1e-12))
     own = control._replace(memory=control.memory.copy(), state=control.state.copy())

@@ -33,6 +33,8 @@ MACHINE = np.dtype(
             "rotor", "shaft", "disk", "lag", "mode",
             # Halvings of the sample that a sub-step needs at least, and needs where the contact's spring acts.
             "coarsest", "resolving", "unresolved",
+            # The same that a sub-step is given at most for its error.
+            "finest",
             # The same from which what a step shows tells whether there is an event; terms of a series.
             "watched", "terms",
             # In shortest sub-steps.
@@ -64,7 +66,7 @@ PARABOLA = np.dtype(
 
 NOW = np.dtype(
     [
-        *((name, np.int64) for name in ("tick", "tripped", "level", "spring", "taken")),
+        *((name, np.int64) for name in ("tick", "tripped", "level", "spring", "taken", "short")),
         *((name, np.float64) for name in (
             "pending", "warmth", "paused", "friction", "bearing", "scale", "rest", "rate",
         )),
@@ -73,7 +75,8 @@ NOW = np.dtype(
     ]
 )  # fmt: skip
 """What changes beside the states: samples so far, whether the drive has switched off, halvings of the next sub-step,
-the part of the contact's stiffness that it takes as a spring, sub-steps so far; the current on its way, A, the
+the part of the contact's stiffness that it takes as a spring, sub-steps so far, and those of them that are as short as
+they get and still wrong by more than the tolerance; the current on its way, A, the
 contact's temperature, °C, and s of pauses; torques of contact and bearings, N·m, what ripple, drift and warmth make of
 the contact's; of the sub-step that is tried, the contact's torque at its end beside its spring, N·m, and by how much
 that rises with the angle."""

@@ -59,11 +59,12 @@ def cross(plant: Plant, before: float, drive: float, late: int, factor: float) -
         while PARTS >> level > room or place % (PARTS >> level) != 0:
             level += 1
         wrong = attempt(plant, torque, factor, now.spring, level)
-        while wrong > 1.0 and level < FINEST:
+        while wrong > 1.0 and level < n.finest:
             now.spring = spring_seen(plant)
             level = max(level + 1, least_level(plant))
             wrong = attempt(plant, torque, factor, now.spring, level)
         now.level = level - (1 if wrong < GROWS else 0)
+        now.short += 1 if wrong > 1.0 else 0
         keep(plant)
         place += PARTS >> level
         energy += now.friction * plant.axis[turning] * float(PARTS >> level)
