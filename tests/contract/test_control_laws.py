@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, NamedTuple
 
 import numpy as np
 import pytest
 
-from stickslip.contract.control_laws import CHECKS, continuous, examine, specimen, variants
+from stickslip.contract.control_laws import CHECKS, continuous, examine, integrating, specimen, variants
 from stickslip.contract.rest import at_rest
 from stickslip.control.linear import Compensation
 from stickslip.control.registry import control_law, control_law_names
@@ -64,6 +65,10 @@ def hidden_unit(y, z, p, u):
 
 def squared(y, z, p, u):
     return p.k * y.error * abs(y.error)
+
+
+def proportional(y, z, p, u):
+    return p.k * y.error - 0.05 * y.velocity
 
 
 def late(y, z, p, u):
@@ -129,6 +134,14 @@ def test_what_begins_to_grow_after_half_an_hour_at_rest_is_told():
 @pytest.mark.parametrize("name", BROKEN)
 def test_what_breaks_the_contract_is_told(name):
     assert name in [v.name for v in examine(BROKEN[name]) if v.passed is False]
+
+
+def test_what_integrates_too_little_is_told_with_what_it_may_leave():
+    told = integrating(broken(proportional, integrates=True))
+    assert told.passed is False
+    left, of, most, share = map(float, re.findall(r"[\d.]+(?:e-\d+)?(?= rad|, of| of it)", told.text))
+    assert left > most
+    assert most == pytest.approx(share * of, rel=0.1)
 
 
 class Pendulum(NamedTuple):

@@ -184,13 +184,34 @@ def test_a_smooth_law_is_linear_about_rest_however_soon_it_bends(width, block):
     assert found[3] == pytest.approx(wanted[3], rel=1e-4)
 
 
+@pytest.mark.parametrize("power", [1.3, 1.5, 2.0])
+@pytest.mark.parametrize("layer", [1e-4, 0.5])
+def test_a_law_that_bends_at_once_has_the_slope_of_rest(power, layer, block):
+    """|s|^1.5 in a boundary layer was refused as not smooth, and a boundary layer advised."""
+    straight = "0.02 * s + 3.0 * y.error"
+    surface = "s = 60.0 * y.error + y.reference_velocity - y.velocity\n"
+    sat = f"min(max(s / {layer}, -1.0), 1.0)"
+    bent = f"{surface}return {straight} + 0.05 * abs({sat}) ** {power - 1.0} * {sat}"
+    found, wanted = (
+        linearised(controller(block(text)), 1e-6, 100.0).state_space()
+        for text in (bent, f"{surface}return {straight}")
+    )
+    assert found[3] == pytest.approx(wanted[3], rel=1e-3)
+
+
 @pytest.mark.parametrize(
-    "body",
-    ["return -math.copysign(0.1, y.velocity)", "return -abs(y.velocity)", "return math.sqrt(abs(y.error))"],
-)
-def test_a_bend_at_rest_is_refused_with_its_remedy(body, block):
+    ("body", "what"),
+    [
+        ("return -math.copysign(0.1, y.velocity)", "after a change of .*, the torque .*: a sign, a jump"),
+        ("return math.sqrt(abs(y.error)) * math.copysign(1.0, y.error)", "after .*, the torque .*: .* or a root"),
+        ("return math.sqrt(abs(y.error))", "after .*, the torque .*: a sign, a jump or a root"),
+        ("return -abs(y.velocity)", "after .*, the torque .*: a kink"),
+        ("z.w = max(y.velocity, 0.0)\nreturn z.w", "after .*, loop.w changes by .*: a kink"),
+    ],
+)  # fmt: skip
+def test_a_bend_at_rest_is_refused_with_what_it_is_and_its_remedy(body, what, block):
     with pytest.raises(
-        InputError, match=r"own is not smooth about rest .*write a smooth function in place of a sign"
+        InputError, match=rf"own is not smooth about rest \({what}.*write a smooth function in place"
     ):
         linearised(controller(block(body)), 1e-6, 100.0)
 

@@ -10,43 +10,23 @@ matrices are the law's.
 
 from __future__ import annotations
 
-import copy
 import math
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
-from typing import Annotated, Any, NamedTuple, cast
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from stickslip.analyse.controller_sample import Sample
 from stickslip.analyse.presliding_loop import describing
+from stickslip.analyse.slope_at_rest import SIZES, slope_at_rest
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
-from stickslip.control.plain import plain_sample
 from stickslip.errors import InputError
 from stickslip.machines.drivetrain import FREE
 from stickslip.model import Model
-from stickslip.spec import Law, Par, Surroundings
+from stickslip.spec import Law, Par
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-CARRIED = (
-    "position",
-    "velocity",
-    "slow_velocity",
-    "error",
-    "applied",
-    "commanded",
-    "residual",
-    "feedforward",
-    "others",
-)
-"""Of the composition's memory, what a sample hands to the next; the rest are flags and clocks."""
-SIZES = (1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
-"""Changes of a number by which the matrices are found, in its unit, the largest first: a law may be smooth and bend
-within 1e-6 rad a sample. What bends within the smallest one too is a sign for every drive."""
-BENT = 1e-4
-"""Part by which answers to changes of other sizes may differ where a law is linear about rest."""
-DEAD = 1e-6
-"""Part of its slope for larger changes below which a law does not answer smaller ones."""
 AGREES = 0.2
 """Part of the largest torque by which a motion's torque may differ from that of the matrices that stand for it."""
 FINER = math.sqrt(10.0)
@@ -151,43 +131,12 @@ def linearised(
             "stability: the controller acts in continuous time; give it a sample_time greater than 0"
         )
     run = _about_rest(controller, amplitude, frequency)
-    found = [_slope(run, row, controller) for row in np.eye(run.size + 1)]
+    found = [slope_at_rest(run, row) for row in np.eye(run.size + 1)]
     whole = np.array(found).T  # what every number becomes, and the torque, by what changed it
     n = run.size
     # A friction law's spring and the last angle are the same number but for a constant: that one is no motion.
     matrices = moved_and_felt(whole[:n, :n], whole[:n, n:], whole[n:, :n])
     return LinearController((*matrices, float(whole[n, n])), controller.sample_time, delay)
-
-
-def _slope(run: _Sample, row: Array, controller: Controller) -> Array:
-    """What a sample makes of a small change of one number, by that change; `InputError` where the law is bent there."""
-    for size in SIZES:
-        ahead, back, further = (run.answers(h * row) / h for h in (size, -size, 10.0 * size))
-        off = max(float(np.abs(one - ahead).max()) for one in (back, further))
-        if off <= BENT * max(float(np.abs(ahead).max()), 1.0):
-            found = 0.5 * (ahead + back)
-            _refuse_dead_band(run, row, controller, found, size)
-            return found
-    raise InputError(
-        f"controller: {_suspects(controller)} is not smooth about rest (it answers changes of {SIZES[-1]:g} and of "
-        f"{10.0 * SIZES[-1]:g} of {run.name_of(int(row.argmax()))} by other slopes), so that there is no linear loop; "
-        "write a smooth function in place of a sign or a jump, tanh(v / v_s) or a boundary layer, or simulate it "
-        "(`stickslip simulate`, `stickslip rig run track`)"
-    )
-
-
-def _refuse_dead_band(run: _Sample, row: Array, controller: Controller, found: Array, size: float) -> None:
-    """`InputError` where no answer to changes of one size becomes an answer to larger ones: that loop stands still."""
-    for larger in (one for one in (10.0 * SIZES[0], *SIZES) if one > size):
-        slope = 0.5 * (run.answers(larger * row) - run.answers(-larger * row)) / larger
-        most = max(float(np.abs(slope).max()), 1.0)
-        if np.any((np.abs(found) <= DEAD * most) & (np.abs(slope) > BENT * most)):
-            raise InputError(
-                f"controller: {_suspects(controller)} has a dead band about rest (it answers changes of {larger:g} of "
-                f"{run.name_of(int(row.argmax()))}, and not those of {size:g}), so that the loop about rest is not "
-                "that of any motion; leave the dead band out here, or simulate it (`stickslip simulate`, "
-                "`stickslip rig run track`)"
-            )
 
 
 def linear_to(controller: Controller, amplitude: float, frequency: float) -> float:
@@ -225,9 +174,9 @@ def linear_to(controller: Controller, amplitude: float, frequency: float) -> flo
     return 0.0
 
 
-def _about_rest(controller: Controller, amplitude: float, frequency: float) -> _Sample:
+def _about_rest(controller: Controller, amplitude: float, frequency: float) -> Sample:
     """A sample of the controller without its torque limit, held friction laws as springs."""
-    return _Sample(with_springs(replace(controller, torque_limit=math.inf), amplitude, frequency))
+    return Sample(with_springs(replace(controller, torque_limit=math.inf), amplitude, frequency))
 
 
 def moved_and_felt(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array]:
@@ -284,117 +233,3 @@ def _stuck(block: ControlBlock, amplitude: float, frequency: float) -> ControlBl
     found = FREE if math.isinf(amplitude) else describing(block.friction, amplitude, frequency)
     own = {f.name: getattr(block.parameters, f.name) for f in block.law.fields}
     return ControlBlock(block.law, Model(SPRING, stiffness=found.stiffness, damping=found.damping), **own)
-
-
-def _suspects(controller: Controller) -> str:
-    """The laws that are not declared linear, or all of them."""
-    names = [
-        b.law.name for b in controller.blocks.values() if not b.law.is_linear and not b.law.holds_friction
-    ]
-    return " and ".join(dict.fromkeys(names or [b.law.name for b in controller.blocks.values()]))
-
-
-class _Sample:
-    """One sample of a controller about rest, from small changes of what it remembers and measures."""
-
-    def __init__(self, controller: Controller) -> None:
-        self.n, self.p = controller.settings, controller.parameters
-        self.m, self.z = controller.memory(), controller.state()
-        self.u = SimpleNamespace(**Surroundings()._asdict())
-        self.controller = controller
-        for _ in range(3):  # flags of a first sample are set
-            self._torque(0.0, self.m, self.z, self.u)
-        self.rest = self._flat(self.m, self.z)
-        self.size = len(self.rest)
-        # A constant torque stands at rest, and what observes it moves on: neither is an answer to a change.
-        self.unchanged = self._after(np.zeros(self.size + 1))
-
-    def answers(self, change: Array) -> Array:
-        """What the sample makes of a change, shape (size + 1,): of every number, and of the torque."""
-        return self._after(change) - self.unchanged
-
-    def torques(self, angles: Array) -> Array:
-        """The torques of samples from rest on, N·m; no numbers from where the law gives none."""
-        m, z, u = _copied(self.m), _copied(self.z), _copied(self.u)
-        out = np.full(len(angles), math.nan)
-        for i, angle in enumerate(angles.tolist()):
-            try:
-                out[i] = self._torque(angle, m, z, u)
-            except InputError:  # LawError too: of this motion it says enough that there is no torque
-                break
-        return out
-
-    def _after(self, change: Array) -> Array:
-        m, z, u = _copied(self.m), _copied(self.z), _copied(self.u)
-        self._set(m, z, self.rest + change[:-1])
-        torque = self._torque(float(change[-1]), m, z, u)
-        return np.append(self._flat(m, z), torque)
-
-    def _torque(self, position: float, m: Any, z: Any, u: Any) -> float:
-        """The torque of a sample; `InputError` where the law gives none at rest."""
-        sample = self.controller.functions["sample"]
-        torque = plain_sample(sample, position, 0.0, 0.0, 0.0, self.n, m, z, self.p, u)
-        if m.fault != 0.0:
-            raise InputError(
-                f"controller: {_suspects(self.controller)} gives a torque that is no finite number at rest, so that "
-                "there is no linear loop; let it return a torque there too"
-            )
-        return torque
-
-    def name_of(self, place: int) -> str:
-        """What a number that is changed is, for people."""
-        names = [*CARRIED, *_names(self.z)]
-        return "the measured angle" if place == self.size else f"{names[place]!r}, which it remembers"
-
-    def _flat(self, m: Any, z: Any) -> Array:
-        return np.array([*(getattr(m, name) for name in CARRIED), *_numbers(z)])
-
-    def _set(self, m: Any, z: Any, values: Array) -> None:
-        numbers = iter(values.tolist())
-        for name in CARRIED:
-            setattr(m, name, next(numbers))
-        _fill(z, numbers)
-
-
-def _copied(part: Any) -> Any:
-    """A state of its own; `copy.deepcopy`, which looks for what is shared, takes as long as a sample."""
-    out = copy.copy(part)
-    for name, value in cast("dict[str, Any]", vars(part)).items():
-        if isinstance(value, SimpleNamespace):
-            setattr(out, name, _copied(value))
-        elif isinstance(value, list):
-            setattr(out, name, list(value))  # type: ignore[reportUnknownArgumentType]
-    return out
-
-
-def _numbers(part: Any) -> list[float]:
-    """The numbers of a state, its parts' too."""
-    out: list[float] = []
-    for value in cast("dict[str, Any]", vars(part)).values():
-        if isinstance(value, SimpleNamespace):
-            out += _numbers(value)
-        else:
-            out += value if isinstance(value, list) else [value]
-    return out
-
-
-def _names(part: Any, before: str = "") -> list[str]:
-    """The names of the numbers of `_numbers`."""
-    out: list[str] = []
-    for name, value in cast("dict[str, Any]", vars(part)).items():
-        if isinstance(value, SimpleNamespace):
-            out += _names(value, f"{before}{name}.")
-        else:
-            out += [before + name] * (len(cast("list[float]", value)) if isinstance(value, list) else 1)
-    return out
-
-
-def _fill(part: Any, numbers: Any) -> None:
-    """Write numbers into a state, in the order of `_numbers`."""
-    for name, value in cast("dict[str, Any]", vars(part)).items():
-        if isinstance(value, SimpleNamespace):
-            _fill(value, numbers)
-        elif isinstance(value, list):
-            setattr(part, name, [next(numbers) for _ in value])  # type: ignore[reportUnknownVariableType]
-        else:
-            setattr(part, name, next(numbers))

@@ -57,6 +57,8 @@ SAME = 1e-9
 """N·m: what torques in other units may differ by."""
 JUMP = 1e-12
 """Of the limit: what the torque may jump by when a controller takes over."""
+LEFT = 1e-6
+"""Of the largest error: what a law that integrates may leave of it."""
 
 
 # ---- the checks ----------------------------------------------------------------------------------------------------
@@ -273,8 +275,9 @@ def integrating(law: ControlLaw) -> Verdict:
         position += TIME * (velocity + 0.5 * TIME * torque / INERTIA)
         velocity += TIME * torque / INERTIA
         largest = max(largest, abs(error))
-    said = f"{abs(error):.2g} rad are left of {largest:.2g} rad after 5 s"
-    return held("integrates", said) if abs(error) <= 1e-6 * largest else failed("integrates", said)
+    most = LEFT * largest
+    said = f"{abs(error):.2g} rad are left of {largest:.2g} rad after 5 s; at most {most:.2g} rad ({LEFT:g} of it)"
+    return held("integrates", said) if abs(error) <= most else failed("integrates", said)
 
 
 def answer(law: ControlLaw, form: Any, error: Array, velocities: tuple[Array, Array], time: float) -> Array:

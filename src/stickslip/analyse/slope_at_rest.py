@@ -1,0 +1,106 @@
+"""The slope at rest of a sample of a controller: what it makes of a small change, by that change; or why there is none.
+
+A law may be smooth and bend at once: a torque of |s|^1.5 has the slope 0 at rest, and another one for any change. Its
+slopes approach that of rest as the change shrinks; those of a sign, a root or a kink do not.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip.analyse.controller_sample import Sample, suspects
+from stickslip.errors import InputError
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+SIZES = (1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
+"""Changes of a number by which the matrices are found, in its unit, the largest first: a law may be smooth and bend
+within 1e-6 rad a sample. What bends within the smallest one too is a sign for every drive."""
+BENT = 1e-4
+"""Part by which answers to changes of other sizes may differ where a law is linear about rest."""
+DEAD = 1e-6
+"""Part of its slope for larger changes below which a law does not answer smaller ones."""
+SHRINKS = 0.6
+"""By which slopes for changes a tenth as large come nearer at least, where they approach the one at rest: |s|^1.25."""
+UNSURE = 0.1
+"""Of the last of these ways, by which slopes at rest of both directions may differ."""
+SIMULATE = "or simulate it (`stickslip simulate`, `stickslip rig run track`)"
+
+
+def slope_at_rest(run: Sample, row: Array) -> Array:
+    """What a sample makes of a small change of one number, by that change.
+
+    Raises
+    ------
+    InputError
+        If the law is bent there, or dead.
+    """
+    for size in SIZES:
+        ahead, back, further = (run.answers(h * row) / h for h in (size, -size, 10.0 * size))
+        off = max(float(np.abs(one - ahead).max()) for one in (back, further))
+        if off <= BENT * max(float(np.abs(ahead).max()), 1.0):
+            found = 0.5 * (ahead + back)
+            _refuse_dead_band(run, row, found, size)
+            return found
+    ahead, back = (np.array([run.answers(h * row) / h for h in one * np.array(SIZES)]) for one in (1.0, -1.0))
+    forwards, backwards = approached(ahead), approached(back)
+    if forwards is None or backwards is None or _apart(forwards, backwards):
+        raise InputError(_bent(run, row, ahead, back))
+    return 0.5 * (forwards.slope + backwards.slope)
+
+
+class Limit(NamedTuple):
+    """A slope that those of smaller and smaller changes approach, and how far the last two of them are apart."""
+
+    slope: Array
+    last: float
+
+
+def approached(slopes: Array) -> Limit | None:
+    """What slopes for changes each a tenth of the one before approach, None where they do not; shape (sizes, n)."""
+    # A boundary layer may end among the largest changes.
+    steps = np.diff(slopes, axis=0)[-3:]
+    ways = np.abs(steps).max(axis=1)
+    if not np.all(ways[1:] <= SHRINKS * ways[:-1]):
+        return None
+    share = ways[-1] / ways[-2] if ways[-2] > 0.0 else 0.0
+    return Limit(slopes[-1] + steps[-1] * share / (1.0 - share), float(ways[-1]))
+
+
+def _apart(ahead: Limit, back: Limit) -> bool:
+    """Whether the slopes of both directions differ at rest."""
+    most = max(float(np.abs(ahead.slope).max()), 1.0)
+    return float(np.abs(ahead.slope - back.slope).max()) > max(
+        BENT * most, UNSURE * max(ahead.last, back.last)
+    )
+
+
+def _bent(run: Sample, row: Array, ahead: Array, back: Array) -> str:
+    """What is not smooth, where, and how it could be, in words; slopes as of `SIZES`, shape (sizes, n)."""
+    off = np.maximum(np.abs(ahead[-1] - back[-1]), np.abs(ahead[-1] - ahead[-2]))
+    place = run.telling(off > BENT * max(float(np.abs(ahead[-1]).max()), 1.0))
+    before, now, behind = (float(one[place]) for one in (ahead[-2], ahead[-1], back[-1]))
+    found = f"after a change of {run.name_of(int(row.argmax()))}, {run.answer_name(place)} changes by "
+    if abs(now) > (1.0 + BENT) * abs(before):
+        found += f"{before:.3g} times {10.0 * SIZES[-1]:g} and {now:.3g} times {SIZES[-1]:g}: a sign, a jump or a root"
+    else:
+        found += f"{now:.3g} times {SIZES[-1]:g} and {behind:.3g} times {-SIZES[-1]:g}: a kink"
+    return (
+        f"controller: {suspects(run.controller)} is not smooth about rest ({found}), so that there is no linear loop; "
+        "write a smooth function in place of a sign, a root or a kink, tanh(v / v_s) or a boundary layer wider than "
+        f"such changes, {SIMULATE}"
+    )
+
+
+def _refuse_dead_band(run: Sample, row: Array, found: Array, size: float) -> None:
+    """`InputError` where no answer to changes of one size becomes an answer to larger ones: that loop stands still."""
+    for larger in (one for one in (10.0 * SIZES[0], *SIZES) if one > size):
+        slope = 0.5 * (run.answers(larger * row) - run.answers(-larger * row)) / larger
+        most = max(float(np.abs(slope).max()), 1.0)
+        if np.any((np.abs(found) <= DEAD * most) & (np.abs(slope) > BENT * most)):
+            raise InputError(
+                f"controller: {suspects(run.controller)} has a dead band about rest (it answers changes of {larger:g} "
+                f"of {run.name_of(int(row.argmax()))}, and not those of {size:g}), so that the loop about rest is not "
+                f"that of any motion; leave the dead band out here, {SIMULATE}"
+            )
