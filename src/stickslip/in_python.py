@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import Any, cast
 
 _options: ContextVar[bool] = ContextVar("stickslip_options", default=False)
 
@@ -26,6 +27,9 @@ MAPS = re.compile(rf"({MAP}(?: {MAP})*)( (?=--))?")
 ONE_MAP = re.compile(r"--map (?:'([^']+)'|(\S+))")
 SET = re.compile(r"--set (\w+)=(\.\.|[^\s,;:)]*)")
 LOOP = re.compile(r"--loop (\w+=[^\s;)]*[^\s;),])")
+TIMING = re.compile(r"--torque-is (commanded|actual|mean)\b")
+SIMULATE = "`stickslip simulate`"
+"""The command that is a function, in messages that name nothing but the command"""
 SAME_LISTS, ITEM = re.compile(r"(\w+)=\[[^\]]*\](?: \1=\[[^\]]*\])+"), re.compile(r"(?<=\[)[^\]]*(?=\])")
 """A list argument for each of several options, and what is in them"""
 WORD = "side|method|compensator|to|intervals|linear|accept|leave-out|extra-torque"
@@ -57,11 +61,25 @@ def in_python(text: str, function: str = "", arrays: bool = False) -> str:
     arrays : bool
         Whether signals were given as arrays, which have units and no columns.
     """
-    if _options.get() or "--" not in text:
+    if _options.get():
+        return text
+    text = text.replace(SIMULATE, "`ss.simulate(...)`")
+    if "--" not in text:
         return text
     text = ALLOW.sub(r"use \1", text)
     parts = CODE.split(text)
     return "".join(p if p.startswith("`") else _said(p, function, arrays) for p in parts)
+
+
+def data_in_python(data: Any, function: str) -> Any:
+    """Plain data, its texts as `in_python` says them."""
+    if isinstance(data, str):
+        return in_python(data, function)
+    if isinstance(data, Mapping):
+        return {k: data_in_python(v, function) for k, v in cast("Mapping[Any, Any]", data).items()}
+    if isinstance(data, list):
+        return [data_in_python(x, function) for x in cast("list[Any]", data)]
+    return data
 
 
 def _said(text: str, function: str, arrays: bool) -> str:
@@ -70,6 +88,7 @@ def _said(text: str, function: str, arrays: bool) -> str:
     text = PLACE.sub("choose another place", text)
     text = MAPS.sub(lambda m: _map(ONE_MAP.findall(m[1]), arrays) + (", " if m[2] else ""), text)
     text = SET.sub(lambda m: f'{settings}={{"{m[1]}": {m[2] or ".."}}}', text)
+    text = TIMING.sub(r'torque_is="\1"', text)
     text = LOOP.sub(lambda m: "loop={" + ", ".join(_item(x, "=") for x in m[1].split(",")) + "}", text)
     text = OPTION.sub(lambda m: _argument(m, function), text)
     return SAME_LISTS.sub(lambda m: f"{m[1]}=[{', '.join(ITEM.findall(m[0]))}]", text)

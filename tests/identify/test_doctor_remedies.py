@@ -49,7 +49,7 @@ def test_counts_have_one_remedy_that_asks_for_nothing_given(tmp_path):
     path = in_counts(tmp_path / "log.csv")
     bare = ss.doctor(path).errors
     assert sorted(f.code for f in bare) == ["position-unit", "torque-unit"]
-    assert "--map position=0x6064:counts --counts-per-rev N" in bare[0].remedy
+    assert 'map={"position": "0x6064:counts"}, counts_per_rev=N' in bare[0].remedy
     x = log()
     shares = np.round(1000.0 * x["tau"] / RATED)
     path = written(
@@ -57,7 +57,7 @@ def test_counts_have_one_remedy_that_asks_for_nothing_given(tmp_path):
     )
     (found,) = ss.doctor(path, rated_torque=RATED).errors
     assert "permille" in found.remedy
-    assert "--rated-torque" not in found.remedy
+    assert "rated_torque" not in found.remedy
     assert ss.doctor(path, map={"torque": "ActTorque:permille"}, rated_torque=RATED).errors == ()
 
 
@@ -70,15 +70,15 @@ def test_counts_beside_a_velocity_have_one_remedy(tmp_path):
         "r2521": np.round(1e4 * x["q"]),
     }
     (found,) = ss.doctor(written(tmp_path / "log.csv", **columns)).errors
-    assert "--map position=r2521:counts --counts-per-rev N" in found.remedy
+    assert 'map={"position": "r2521:counts"}, counts_per_rev=N' in found.remedy
 
 
 def test_time_that_runs_backwards_has_a_remedy_that_helps(tmp_path):
     x = log()
     path = written(tmp_path / "log.csv", time=x["t"][::-1], position=x["q"], torque=x["tau"])
     found = next(f for f in ss.doctor(path).errors if f.code == "backward-time")
-    assert "--rows" not in found.remedy
-    assert "--sample-time SECONDS" in found.remedy
+    assert "rows=" not in found.remedy
+    assert "sample_time=SECONDS" in found.remedy
     assert ss.doctor(path, sample_time=2e-3).errors == ()
 
 
@@ -87,7 +87,7 @@ def test_of_several_records_the_longest_is_named(tmp_path):
     time = np.concatenate([x["t"][:5], x["t"][:2000], x["t"][:995]])
     path = written(tmp_path / "log.csv", time=time, position=x["q"], torque=x["tau"])
     (found,) = ss.doctor(path).errors
-    assert "--rows 6:2005" in found.remedy
+    assert 'rows="6:2005"' in found.remedy
     assert ss.doctor(path, rows="6:2005").errors == ()
 
 
@@ -98,7 +98,7 @@ def test_a_velocity_without_a_position_is_said(tmp_path):
     )
     said = next(f for f in ss.doctor(path).findings if f.code == "missing-column")
     assert "no position" in said.message
-    assert "--map position=COLUMN:rad" in said.remedy
+    assert 'map={"position": "COLUMN:rad"}' in said.remedy
 
 
 def test_an_axis_is_identified_from_velocity_and_torque_alone(tmp_path):
@@ -162,7 +162,7 @@ def test_a_unit_that_is_stated_and_not_known_is_asked_for(tmp_path, unit):
     )
     (found,) = ss.doctor(path).errors
     assert found.code == "unknown-unit"
-    assert f"velocity=Speed act [{unit}]:rev/s" in found.remedy
+    assert f'"velocity": "Speed act [{unit}]:rev/s"' in found.remedy
     assert not ss.doctor(path, map={"velocity": f"Speed act [{unit}]:rad/s"}).errors
 
 

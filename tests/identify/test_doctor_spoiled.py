@@ -194,7 +194,7 @@ def test_the_grid_of_an_encoder_tells_degrees_and_turns_in_a_rounded_file(turn, 
     for finding in found:
         assert finding.level == "warning"
         assert f"{2**bits} counts" in finding.message
-        assert f"position=position [rad]:{unit}" in finding.remedy.replace("'", "")
+        assert f'"position": "position [rad]:{unit}"' in finding.remedy
 
 
 def test_no_grid_of_degrees_or_turns_is_seen_in_positions_in_rad():

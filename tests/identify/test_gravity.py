@@ -127,7 +127,7 @@ def test_a_pendulum_behind_a_gear_is_the_loads():
     found = ss.identify(**log, law="coulomb", pendulum=True, gear_ratio=ratio, tell=told.append)
     (warned,) = [f for f in found.findings if f.code == "gear-ratio"]
     assert warned.level == "warning"
-    assert "a pendulum is fitted once a turn of the motor; give --side load" in warned.line()
+    assert 'a pendulum is fitted once a turn of the motor; give side="load"' in warned.line()
     assert any(warned.line() in line for line in told)
     assert 'a pendulum is fitted once a turn of the motor; give side="load"' in str(found)
     asked = ss.doctor(**log, gear_ratio=ratio)

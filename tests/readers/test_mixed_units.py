@@ -99,7 +99,7 @@ def test_a_rated_torque_that_no_unit_asks_for_is_not_passed_over(tmp_path):
     path = written(tmp_path / "log.csv", "time [s],position [rad],torque", Q, 100.0 * TORQUE)
     (found,) = ss.doctor(path, rated_torque=3.0).errors
     assert found.code == "torque-unit"
-    assert "--map motor_torque=torque:percent (or permille)" in found.remedy
+    assert 'map={"motor_torque": "torque:percent"} (or permille)' in found.remedy
     stated = written(tmp_path / "nm.csv", "time [s],position [rad],torque [Nm]", Q, TORQUE)
     found = ss.doctor(stated, rated_torque=3.0, lead=LEAD)
     assert {"rated-torque", "lead"} <= {f.code for f in found.findings}

@@ -198,7 +198,7 @@ def test_whole_milliseconds_of_a_fast_log_do_not_contradict_its_rate(signals: di
     found = {f.code: f for f in ss.doctor(columns, sample_time=1e-3).findings}["time-overruled"]
     apart = float(found.message.rpartition("rows are ")[2].split()[0])
     assert apart == pytest.approx(0.25e-3, rel=1e-2)
-    assert found.remedy == "leave --sample-time out if the column is right"
+    assert found.remedy == "leave sample_time out if the column is right"
 
 
 def test_a_rate_of_a_profile_that_a_column_contradicts_names_the_profile(

@@ -12,6 +12,8 @@ from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import USUAL_TIME
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
+from stickslip.identify.regression.regression import Regression
+from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record, encoder_step, row_period
 from stickslip.report.after_a_map import after_a_map
 from stickslip.report.sliding_torque import beaten, sliding_of
@@ -31,6 +33,8 @@ MOTIONS = {
     "presliding": "slow ramps of the torque to and fro, below break-away", "stickslip": "slow constant speeds",
 }  # fmt: skip
 """What it moves, for a drive that does it in a program of its own."""
+HEAVY = 0.25
+"""Of friction's level: a torque once a turn from which on it may be a weight."""
 SAME = 2e-3
 """Part of a count that the step in a log, of differences of rounded positions, may be off."""
 FINEST = 1e-8
@@ -55,6 +59,35 @@ def next_steps(
     found: Identification, records: Sequence[Record], model_file: str | Path, files: Sequence[str]
 ) -> list[Step]:  # fmt: skip
     """The next commands: towards a setting where what matters is identified, towards another record where not."""
+    return [*weighed(found, files, str(model_file)), *further_steps(found, records, model_file, files)]
+
+
+def weighed(found: Identification, files: Sequence[str], model_file: str) -> list[Step]:
+    """To identify with gravity, where the angle shows a weight that nobody has named: it is in the friction else."""
+    axis = found.details.get("axis")
+    if not isinstance(axis, ServoAxis) or axis.gravity == "pendulum" or found.method == "cogging":
+        return []
+    told = any(f.code == "gravity" and "--pendulum" in f.remedy for f in found.findings)
+    regression = found.details.get("regression")
+    if not told and isinstance(regression, Regression) and axis.motion != "linear":
+        once = zip(regression.orders, regression.harmonics.tolist(), strict=True)
+        told = any(
+            abs(math.tau * order - 1.0) < 1e-3 and x > HEAVY * abs(regression.friction) for order, x in once
+        )
+    if not told:
+        return []
+    said = (
+        "The torque depends on the angle as gravity does: identify with --pendulum, or turn the axis upright"
+    )
+    again = f"stickslip identify {quoted(files)} --pendulum --out {shlex.quote(model_file)}{OPTIONS}"
+    call = "found = ss.identify(..., pendulum=True)  # gravity shows over the angle; with the arguments of this run"
+    return [Step(f"{said}:", again, call) if files else Step(f"{said}.", "", call)]
+
+
+def further_steps(
+    found: Identification, records: Sequence[Record], model_file: str | Path, files: Sequence[str]
+) -> list[Step]:  # fmt: skip
+    """As `next_steps`, of an axis whose weight is named."""
     wanted = [Step(s) for s in found.measure_next]
     if found.method == "cogging":
         return [*wanted, Step(*after_a_map(found, model_file))]

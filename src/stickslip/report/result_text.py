@@ -32,10 +32,16 @@ def measured(step: Step) -> str:
 
 def result_lines_in_python(found: Identification, answers: Answers) -> list[str]:
     """The same, what to do now in Python where it can be done there."""
-    steps = [
-        f"next: {s.python}" if s.python else measured(s) or f"next, in a shell: {s.command}" for s in answers.steps
-    ]  # fmt: skip
+    steps = [f"next: {s.python}" if s.python else step_in_python(s) for s in answers.steps]
     return [*(in_python(line, "identify") for line in numbers_and_trust(found, answers)), *steps]
+
+
+def step_in_python(step: Step) -> str:
+    """A step that has no function: a record to make, or a command of the shell."""
+    if not measured(step):
+        return f"next, in a shell: {step.command}"
+    command = f"`{step.command}` in a shell" if step.command else ""
+    return in_python(f"measure next: {step.what} {command}".rstrip(), "identify")
 
 
 def numbers_and_trust(found: Identification, answers: Answers) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Unpack
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
-from stickslip.identify.doctor import Diagnosis, examine
+from stickslip.identify.doctor import Diagnosis, examine, findings_in_python
 from stickslip.readers.cut import file_rows, pieces, range_words
 from stickslip.verbs.reading import Log, Reading, open_log
 
@@ -50,7 +50,7 @@ def doctor(
     record = open_log(log, reading).record
     parts, short = pieces(record)
     every = [examine(part, stribeck_velocity=stribeck_velocity, accept=accept) for part in parts]
-    findings = tuple(merged(every, short))
+    findings = findings_in_python(merged(every, short), record)
     return Diagnosis(findings, every[0].record if len(every) == 1 else record)
 
 

@@ -18,10 +18,12 @@ from stickslip.config import Table
 from stickslip.errors import InputError
 from stickslip.extras import needed
 from stickslip.finding import Finding
+from stickslip.identify.doctor import findings_in_python
 from stickslip.identify.estimate import Estimate, Held, Identification, Picture
 from stickslip.identify.identified_file import Identified, identified_in
 from stickslip.identify.model_file import in_memory, model_content, versions, write_model
 from stickslip.identify.motion import motion_of, speeds_of
+from stickslip.in_python import data_in_python, in_python
 from stickslip.machines.identified import identified_machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.position_map import PositionMap
@@ -131,12 +133,12 @@ class IdentificationResult:
     @property
     def verdict(self) -> str:
         """Whether the numbers can be trusted, in a line."""
-        return self.answers.trust
+        return in_python(self.answers.trust, "identify")
 
     @property
     def evidence(self) -> tuple[str, ...]:
         """Why, a sentence each."""
-        return self.answers.evidence
+        return tuple(in_python(s, "identify") for s in self.answers.evidence)
 
     @property
     def misfit(self) -> Mapping[str, float]:
@@ -146,12 +148,12 @@ class IdentificationResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user must know, one sentence each."""
-        return self.identification.notes
+        return tuple(in_python(s, "identify") for s in self.identification.notes)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What the doctor found in the logs."""
-        return self.identification.findings
+        return tuple(f for s in self.sources for f in findings_in_python(s.findings, s.record))
 
     @cached_property
     def answers(self) -> Answers:
@@ -267,7 +269,7 @@ class IdentificationResult:
     def as_dict(self) -> dict[str, Any]:
         """Law, estimates, correlation, misfit and sentences as plain data; ``trust`` is `verdict`, ``doubts`` what it
         names against the numbers (empty where nothing speaks against them), ``evidence`` why."""
-        return {**self.identification.as_dict(), **self.answers.as_dict()}
+        return data_in_python({**self.identification.as_dict(), **self.answers.as_dict()}, "identify")
 
     def to_pandas(self) -> pandas.DataFrame:
         """The parameters as a data frame: value, lower, upper, unit, identified, verdict.

@@ -13,6 +13,7 @@ from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
+from stickslip.in_python import data_in_python, in_python
 from stickslip.model import Model
 from stickslip.recommend.file import setting_table, write_setting
 from stickslip.recommend.recommend import Candidate, Recommendation
@@ -99,7 +100,7 @@ class RecommendationResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user must know, one sentence each."""
-        return self.recommendation.notes
+        return tuple(in_python(n, "recommend") for n in self.recommendation.notes)
 
     @arguments_checked
     def save(self, path: str | os.PathLike[str] = "recommended.toml") -> Path:
@@ -126,10 +127,11 @@ class RecommendationResult:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, all candidates too."""
-        return self.recommendation.as_dict()
+        return data_in_python(self.recommendation.as_dict(), "recommend")
 
     def __str__(self) -> str:
-        return "\n".join(recommendation_lines(self.recommendation, self.identified.unit))
+        lines = recommendation_lines(self.recommendation, self.identified.unit)
+        return "\n".join(in_python(line, "recommend") for line in lines)
 
     def __repr__(self) -> str:
         if self.recommendation.instead is not None:

@@ -43,8 +43,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 WINDOW, CREEP = 0.02, 1e-3
 """s over which a speed is averaged; part of the highest below which an axis counts as at rest."""
 ONLY_REVERSALS = (
-    "only reversals determine it, and the torque is not known to act from row to row as recorded; log the command at "
-    "the drive's own rate"
+    "only reversals determine it, and the torque is not known to act from row to row as recorded; say so if its column "
+    "is the command (--torque-is commanded and --delay 0), or log the command at the drive's own rate"
 )
 IN_SERIES = (
     "only reversals determine it, and the torque bends as with a load behind a spring, which yields there, too; record "
@@ -355,8 +355,9 @@ def advice(estimates: Sequence[Estimate], law: Law, doubt: str = "") -> tuple[st
     stiff = {n for n in missing if units.get(n) == "N·m/rad" or n in ("sigma1", "k")}
     if any(e.verdict == ONLY_REVERSALS for e in estimates):
         out.append(
-            "Log the commanded torque at the drive's own rate, or say what the column holds (--torque-is) and how late "
-            "it acts (--delay)."
+            "If the torque's column is the command itself, held from row to row, say so: --torque-is commanded and "
+            "--delay 0. Otherwise log it so at the drive's own rate, or say what the column holds (--torque-is) and "
+            "how late it acts (--delay)."
         )
     elif stiff:
         out.append(

@@ -100,10 +100,7 @@ class Diagnosis:
 
     def _line(self, finding: Finding) -> str:
         """A finding in words: in Python its remedy names arguments, of arrays their own."""
-        reading: dict[str, Any] = self.record.meta.get("reading", {})
-        sources = {c["source"] for c in reading.get("columns", ())}
-        arrays = not reading.get("file") and sources == {"map"}
-        return in_python(finding.line(), "identify", arrays)
+        return in_python(finding.line(), "identify", of_arrays(self.record))
 
     def __str__(self) -> str:
         lines = [f"{f.level:<8}{f.code:<24}{self._line(f)}" for f in self.findings]
@@ -131,6 +128,22 @@ class Diagnosis:
             first, *others = self.errors
             more = f" (and {len(others)} more errors: the doctor lists them)" if others else ""
             raise InputError(f"{name}: {first.line()}{more}")
+
+
+def of_arrays(record: Record) -> bool:
+    """Whether the signals were given as arrays by name: they have units and no columns."""
+    reading: dict[str, Any] = record.meta.get("reading", {})
+    sources = {c["source"] for c in reading.get("columns", ())}
+    return not reading.get("file") and sources == {"map"}
+
+
+def findings_in_python(findings: Sequence[Finding], record: Record) -> tuple[Finding, ...]:
+    """Findings whose words name arguments to whoever called a function."""
+    arrays = of_arrays(record)
+    return tuple(
+        replace(f, **{n: in_python(getattr(f, n), "identify", arrays) for n in ("message", "remedy")})
+        for f in findings
+    )
 
 
 def examine(
