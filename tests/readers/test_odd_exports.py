@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stickslip.errors import InputError
 from stickslip.readers import read
 from stickslip.readers._cells import cell
 from stickslip.record import Record
@@ -56,6 +57,39 @@ def test_points_between_thousands(tmp_path):
     np.testing.assert_allclose(record.time, 10.0 * T, atol=1e-9)
     np.testing.assert_allclose(record["position"], 1e-4 * Q, atol=1e-7)
     assert not record.meta["reading"]["findings"]
+
+
+def counted(counts, torque):
+    """A log of counts and torques, as two formats write them."""
+    rows = [f"{1e3 * t:.0f};{counts.format(round(1e2 * q))};{torque.format(m)}" for t, q, m in zip(T, Q, M)]
+    return "Zeit [ms];Position [µm];Moment [N]\n" + "\n".join(rows)
+
+
+def test_points_between_thousands_of_whole_numbers(tmp_path):
+    """1.234 was read as 1.234 beside 12,3: a thousandth, in the rows above 999 alone."""
+    text = counted("{:,}", "{:.1f}").replace(".", "!").replace(",", ".").replace("!", ",")
+    record = loaded(tmp_path, text)
+    np.testing.assert_allclose(record["position"], 1e-6 * np.round(1e2 * Q), atol=1e-12)
+    np.testing.assert_allclose(record["motor_torque"], np.round(M, 1), atol=1e-9)
+    (finding,) = record.meta["reading"]["findings"]
+    assert finding["code"] == "thousands"
+    assert "in column 2 was read as 1" in finding["message"]
+
+
+def test_commas_between_thousands_of_whole_numbers(tmp_path):
+    record = loaded(tmp_path, counted("{:,}", "{:.1f}"))
+    np.testing.assert_allclose(record["position"], 1e-6 * np.round(1e2 * Q), atol=1e-12)
+    np.testing.assert_allclose(record["motor_torque"], np.round(M, 1), atol=1e-9)
+
+
+def test_points_and_commas_that_nothing_tells_apart_are_refused(tmp_path):
+    rows = [f"{1e3 * t:.0f};{5 + t:.3f};{7 + t:.3f}".rsplit(".", 1) for t in T]
+    text = "Zeit [ms];Position [mm];Kraft [N]\n" + "\n".join(",".join(r) for r in rows)
+    with pytest.raises(InputError, match=r"'5.000' in column 2 and '7,000' .* nothing tells which"):
+        loaded(tmp_path, text)
+    one = "Zeit [ms];Kraft [N];Position [mm]\n0;0,5;1.5\n" + "\n".join(f"{i};0,5;{i},5" for i in range(1, 40))
+    with pytest.raises(InputError, match=r"'1.5' in column 3 and '1,5'"):
+        loaded(tmp_path, one)
 
 
 @pytest.mark.parametrize("begin", [8 * 3600, 86400 - 0.1])

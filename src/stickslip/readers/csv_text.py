@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers import _scope
 from stickslip.readers._cells import OF_DAY, cell, clocks_whole, moment, over_midnight
+from stickslip.readers._signs import between_thousands
 from stickslip.readers._stated_period import is_period
 from stickslip.readers._units import may_be_unit
 from stickslip.readers.table_columns import Array, Column, Format, Table
@@ -76,7 +77,10 @@ def read(path: Path) -> Table:
     body = [line for line in lines[dialect.start :] if line.strip()]
     body, findings = _without_headers(body, above, dialect)
     body, footer = _without_footer(body, dialect)
-    values, odd = _values(body, dialect, dialect.start)
+    try:
+        values, odd = _values(body, dialect)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     findings += [*footer, *odd]
     if (groups := _scope.groups(header, dialect.width)) is not None:
         # The groups of slower channels end earlier.
@@ -243,8 +247,20 @@ def _clocks(body: Sequence[str], dialect: Dialect) -> dict[int, bool]:
     return {i: daily for i, daily in told.items() if i not in dialect.words}
 
 
-def _values(body: Sequence[str], dialect: Dialect, start: int) -> tuple[Array, list[Finding]]:
-    """The rows as numbers, shape (n, width); NaN where a cell holds none."""
+def _values(body: Sequence[str], dialect: Dialect) -> tuple[Array, list[Finding]]:
+    """The rows as numbers, shape (n, width); NaN where a cell holds none.
+
+    Raises
+    ------
+    InputError
+        If points and commas both stand in it, and nothing tells which of them is the decimal sign.
+    """
+    if dialect.decimal == "," and any("." in line for line in body):
+        cells = (dialect.split(line) for line in body)
+        between, findings = between_thousands(cells, dialect.width, dialect.words)
+        if between:
+            values, odd = _values_one_by_one(body, dialect, between)
+            return values, [*findings, *odd]
     if dialect.decimal == "." or dialect.delimiter != ",":
         text = "\n".join(body)
         if dialect.decimal == ",":
@@ -259,7 +275,11 @@ def _values(body: Sequence[str], dialect: Dialect, start: int) -> tuple[Array, l
     return _values_one_by_one(body, dialect)
 
 
-def _values_one_by_one(body: Sequence[str], dialect: Dialect) -> tuple[Array, list[Finding]]:
+def _values_one_by_one(
+    body: Sequence[str], dialect: Dialect, between: Mapping[int, str] | None = None
+) -> tuple[Array, list[Finding]]:
+    """Cell by cell; `between` has the sign between the thousands of some columns."""
+    between = between or {}
     values = np.full((len(body), dialect.width), np.nan)
     short, long, words = list[int](), list[int](), list[tuple[int, int, str]]()
     for i, line in enumerate(body):
@@ -271,7 +291,7 @@ def _values_one_by_one(body: Sequence[str], dialect: Dialect) -> tuple[Array, li
         for j, text in enumerate(cells[: dialect.width]):
             if j in dialect.words:
                 continue
-            value = cell(text, dialect.decimal)
+            value = cell(text.replace(between[j], "") if j in between else text, dialect.decimal)
             if value is None:
                 words.append((i, j, text.strip()))
             else:
