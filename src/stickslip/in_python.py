@@ -22,9 +22,9 @@ SIGNALS = {"time": "t", "position_reference": "reference", "motor_torque": "torq
 CODE = re.compile(r"(`[^`]*`)")
 ALLOW = re.compile(r"give --allow-code \(in Python: (`[^`]*`)\)")
 PLACE = re.compile(r"choose another place with --out")
-MAP = r"--map (?:'[^'=]+=[^']+'|\w+=[^\s,;)]*[^\s,;:)])"
+MAP = r"--(?:motion-)?map (?:'[^'=]+=[^']+'|\w+=[^\s,;)]*[^\s,;:)])"
 MAPS = re.compile(rf"({MAP}(?: {MAP})*)( (?=--))?")
-ONE_MAP = re.compile(r"--map (?:'([^']+)'|(\S+))")
+ONE_MAP = re.compile(r"--(?:motion-)?map (?:'([^']+)'|(\S+))")
 SET = re.compile(r"--set (\w+)=(\.\.|[^\s,;:)]*)")
 LOOP = re.compile(r"--loop (\w+=[^\s;)]*[^\s;),])")
 TIMING = re.compile(r"--torque-is (commanded|actual|mean)\b")
@@ -86,7 +86,7 @@ def _said(text: str, function: str, arrays: bool) -> str:
     """Of a part that is no command."""
     settings = "settings" if function == "export" else "values"
     text = PLACE.sub("choose another place", text)
-    text = MAPS.sub(lambda m: _map(ONE_MAP.findall(m[1]), arrays) + (", " if m[2] else ""), text)
+    text = MAPS.sub(lambda m: _map(m[1], arrays) + (", " if m[2] else ""), text)
     text = SET.sub(lambda m: f'{settings}={{"{m[1]}": {m[2] or ".."}}}', text)
     text = TIMING.sub(r'torque_is="\1"', text)
     text = LOOP.sub(lambda m: "loop={" + ", ".join(_item(x, "=") for x in m[1].split(",")) + "}", text)
@@ -94,11 +94,12 @@ def _said(text: str, function: str, arrays: bool) -> str:
     return SAME_LISTS.sub(lambda m: f"{m[1]}=[{', '.join(ITEM.findall(m[0]))}]", text)
 
 
-def _map(found: list[tuple[str, str]], arrays: bool) -> str:
-    """What `--map`, one or several, is in Python."""
-    every = [(quoted or bare).partition("=")[::2] for quoted, bare in found]
+def _map(options: str, arrays: bool) -> str:
+    """What `--map` or `--motion-map`, one or several, is in Python."""
+    every = [(quoted or bare).partition("=")[::2] for quoted, bare in ONE_MAP.findall(options)]
     if not arrays:
-        return "map={" + ", ".join(f'"{role}": "{column}"' for role, column in every) + "}"
+        name = "motion_map" if options.startswith("--motion") else "map"
+        return name + "={" + ", ".join(f'"{role}": "{column}"' for role, column in every) + "}"
     said: list[str] = []
     for role, column in every:
         name, unit = SIGNALS.get(role, role), column.rpartition(":")[2] if ":" in column else ""

@@ -22,7 +22,7 @@ from stickslip.recommend.plant import Plant
 from stickslip.recommend.recommendation import Recommendation
 from stickslip.recommend.refusals import doubted_inertia
 from stickslip.report.recommendation_text import reduction
-from stickslip.verbs.recommend import motion_in
+from stickslip.verbs.motion_given import motion_in
 
 T = 1e-3
 MOVE, PAUSE, TOP = 1.0, 0.2, 15.0
@@ -178,7 +178,7 @@ def test_a_measured_motion_is_told_from_the_drives_reference(tmp_path: Path) -> 
     columns = np.stack([time, moved(time)[0], np.sin(time)], axis=1)
     np.savetxt(table, columns[:, :2], delimiter=",", header="time_s,position_rad", comments="")
     np.savetxt(log, columns, delimiter=",", header="time_s,position_rad,torque_Nm", comments="")
-    asked, did = motion_in(table), motion_in(log)
+    (asked, _), (did, _) = motion_in(table), motion_in(log)
     assert asked.source.startswith("points of cycle.csv")
     assert did.source.startswith("position of log.csv")
     assert not list(on_motion(Drive(10.0, motion=asked), "rad"))

@@ -106,6 +106,11 @@ def motion_arguments(parser: argparse.ArgumentParser) -> None:
         help="log or CSV (time, position) of the application's motion (default: that of the identified log)",
     )  # fmt: skip
     parser.add_argument(
+        "--motion-map", action="append", default=[], metavar="CHANNEL=COLUMN[:UNIT]",
+        help="column and unit of a channel of that log, as --map of `stickslip identify`; repeatable (positions in "
+        "counts: --counts-per-rev)",
+    )  # fmt: skip
+    parser.add_argument(
         "--amplitude",
         type=float,
         metavar="RAD",
@@ -157,8 +162,8 @@ def run(args: argparse.Namespace) -> int:
             args.model, bandwidth=args.bandwidth, damping=args.damping, linear=args.linear, loop=args.loop,
             controller=args.controller, machine=args.machine,
             sample_time=args.sample_time, counts_per_rev=args.counts_per_rev, torque_limit=args.torque_limit,
-            motion=args.motion, amplitude=args.amplitude, frequency=args.frequency, inertia=args.inertia,
-            feed_inertia=args.feed_inertia,
+            motion=args.motion, motion_map=args.motion_map, remember=True, amplitude=args.amplitude,
+            frequency=args.frequency, inertia=args.inertia, feed_inertia=args.feed_inertia,
             compensators=[n.strip() for n in args.compensators.split(",")] if args.compensators else (),
             axes=args.axes, confirm=args.confirm, progress=progress,
         )  # fmt: skip

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 from stickslip.approval import allow_code
 from stickslip.arguments import arguments_checked
@@ -18,17 +18,16 @@ from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import kind_of_loop
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.motion import Motion, motion_of
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
-from stickslip.readers.reading import read
 from stickslip.recommend import recommend as setting
 from stickslip.recommend.candidate_run import Drive
-from stickslip.recommend.course import measured
 from stickslip.recommend.sample_time import sample_time_for
 from stickslip.verbs.candidates_given import Given, compensators_of, made_for
 from stickslip.verbs.compare import IdentifiedModel, identified_of
-from stickslip.verbs.reading import Log, open_log
+from stickslip.verbs.motion_given import Given as MotionGiven
+from stickslip.verbs.motion_given import motion_in
+from stickslip.verbs.reading import Log
 from stickslip.verbs.recommendation import RecommendationResult
 
 USUAL: Mapping[str, Any] = {
@@ -39,9 +38,6 @@ USUAL: Mapping[str, Any] = {
     "sample_time": None,
 }
 """What `recommend` takes where nothing is given."""
-
-FORCES = ("motor_torque", "current", "voltage")
-"""Channels beside which a position is what an axis did."""
 
 
 @arguments_checked
@@ -58,6 +54,8 @@ def recommend(
     counts_per_rev: float | None = None,
     torque_limit: float = math.inf,
     motion: Log | None = None,
+    motion_map: Mapping[str, str] | Sequence[str] = (),
+    remember: bool = False,
     amplitude: float | None = None,
     frequency: float | None = None,
     inertia: float | None = None,
@@ -105,6 +103,11 @@ def recommend(
     motion : log, optional
         Time and position of the motion that matters; that of the identification's log unless given. Tried from rest
         to rest; one that never rests is begun and braked smoothly, which is not judged.
+    motion_map : mapping of str to str, or sequence of str
+        Which of its columns is which channel, in which unit, as `map` of `identify`. Positions in counts are read by
+        `counts_per_rev`.
+    remember : bool
+        Whether its file is read by the profile kept for files with its columns, as the command line does.
     amplitude, frequency : float, optional
         Of a slow sinusoid as the motion instead, rad (m) and Hz (0.5).
     inertia : float, optional
@@ -136,6 +139,8 @@ def recommend(
     damping = float(USUAL["damping"]) if damping is None else damping
     refuse_numbers(axes, confirm)
     refuse_together(motion, amplitude, frequency)
+    if motion_map and motion is None:
+        raise InputError("--motion-map says how the log of --motion is read; give that, too")
     if loop is not None:
         refuse_beside_loop(loop, linear=linear, bandwidth=bandwidth, damping=damping)
     tried = compensators_of(compensators)
@@ -143,7 +148,11 @@ def recommend(
     at_hand = load_machine(machine) if isinstance(machine, (str, os.PathLike)) else machine
     if at_hand is not None:
         counts_per_rev = at_hand.encoder.counts if counts_per_rev is None else counts_per_rev
-    path = None if motion is None else motion_in(motion)
+    path, told = None, tuple[str, ...]()
+    if motion is not None:
+        path, told = motion_in(
+            motion, MotionGiven(motion_map, counts_per_rev or 0.0, remember, found.unit("rad"))
+        )
     if controller is not None:
         refuse_beside(controller, loop=loop, linear=linear, bandwidth=bandwidth, damping=damping)
 
@@ -171,11 +180,15 @@ def recommend(
         drive = replace(drive, machine=at_hand, torque_limit=min(drive.torque_limit, most))
     besides = made_for(tried, drive, inertia or found.axis.get("inertia"), found.model)
     with allow_code(bool(found.law_file)):  # its model has been read: whoever must approve it has
-        result = setting.recommend(
-            found, drive, inertia=inertia, axes=axes, confirm=confirm, progress=progress, feed_inertia=feed_inertia,
-            compensators=besides,
-        )  # fmt: skip
-    return RecommendationResult(result, found)
+        try:
+            result = setting.recommend(
+                found, drive, inertia=inertia, axes=axes, confirm=confirm, progress=progress,
+                feed_inertia=feed_inertia, compensators=besides,
+            )  # fmt: skip
+        except InputError as error:
+            # A motion in a wrong unit is refused as one that no drive can follow.
+            raise InputError("; ".join([str(error), *told])) from None
+    return RecommendationResult(replace(result, notes=(*told, *result.notes)), found)
 
 
 def refuse_numbers(axes: int, confirm: int) -> None:
@@ -317,17 +330,3 @@ def loop_of(given: str | Mapping[str, float]) -> tuple[Gains | Cascade, dict[str
         raise InputError(f"--loop {given}: give kp, greater than 0")
     own = {name: numbers.pop(name) for name in ("filter", "limit") if name in numbers}
     return kind(**numbers), own
-
-
-def motion_in(log: Log) -> Motion:
-    """The motion of a log or of a table of points."""
-    if isinstance(log, (str, os.PathLike)):
-        path = Path(cast("str", log))
-        record, name = read(path), path.name
-    else:
-        record, name = open_log(log, {}).record, "the motion given"
-    motion = motion_of(record, name)
-    if measured(motion) and not set(FORCES) & set(record.channels):
-        # Times and positions alone, without a torque, are what somebody wants the axis to do.
-        return replace(motion, source=f"points{motion.source.removeprefix('position')}")
-    return motion

@@ -1,0 +1,235 @@
+"""The motion that `recommend` is given: read as `identify` reads a log, and what is to be said of how it was read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.finding import Finding
+from stickslip.identify.doctor import timing, units
+from stickslip.identify.doctor.view import View
+from stickslip.identify.motion import REFERENCES, Motion, motion_of
+from stickslip.in_python import in_python
+from stickslip.readers import profiles, remembered
+from stickslip.readers._names import ROLES
+from stickslip.readers.convert import Drive
+from stickslip.readers.derive import positioned
+from stickslip.readers.reading import open_table, record_of
+from stickslip.recommend.course import measured
+from stickslip.record import Record
+from stickslip.verbs.kinds import require
+from stickslip.verbs.reading import Log, Reading, open_log
+
+FORCES = ("motor_torque", "current", "voltage")
+"""Channels beside which a position is what an axis did."""
+MOTION = ("time", "position", *REFERENCES)
+"""All that is wanted of a motion's log."""
+CHECKS = (
+    units.assumed,
+    timing.scale,
+    units.counted,
+    units.degrees,
+    units.turns,
+    units.reference_scale,
+    units.too_fast,
+)
+"""What the doctor looks at: units, by what the numbers themselves say."""
+CODES = (
+    "unknown-unit",
+    "time-unit",
+    "no-clock",
+    "position-unit",
+    "position-reference-unit",
+    "reference-scale",
+)
+POINTS = 200
+"""Rows of a table of points, from which on nobody has written them down so far apart that they are taken for ms."""
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A record of a motion, whether an axis was driven along it, and what is to be said of how it was read."""
+
+    record: Record
+    driven: bool
+    notes: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True)
+class Given:
+    """How a motion's log is read.
+
+    Attributes
+    ----------
+    mapping : mapping of str to str, or sequence of str
+        Which column is time, position, reference, as `map` of `identify`.
+    counts_per_rev : float
+        Of the encoder, for positions in counts; 0: not given.
+    remember : bool
+        Whether the profile kept for files with these columns is used.
+    unit : str
+        In which the axis moves, rad or m.
+    """
+
+    mapping: Mapping[str, str] | Sequence[str] = ()
+    counts_per_rev: float = 0.0
+    remember: bool = False
+    unit: str = "rad"
+
+    @property
+    def listed(self) -> list[str]:
+        """The mapping as options say it."""
+        if isinstance(self.mapping, Mapping):
+            return [f"{channel}={column}" for channel, column in self.mapping.items()]
+        return list(self.mapping)
+
+
+def motion_in(log: Log, given: Given = Given()) -> tuple[Motion, tuple[str, ...]]:
+    """The motion of a log or of a table of points, and what must be known of how it was read.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, does not move, or its numbers are certainly in another unit than they are taken in.
+    """
+    source: Any = log
+    path = Path(source) if isinstance(source, (str, os.PathLike)) else None
+    name = path.name if path else "the motion given"
+    try:
+        opened = _opened(path or log, given)
+        record = opened.record
+        motion = motion_of(record, name)
+        notes = list(_units_of(opened, given, path))
+    except InputError as error:
+        said = str(error)
+        where = "" if name in said else f"--motion {path}: " if path else f"{name}: "
+        raise InputError(_as_motion(f"{where}{said}")) from None
+    if measured(motion) and not opened.driven:
+        # Times and positions alone, without a torque, are what somebody wants the axis to do.
+        motion = replace(motion, source=f"points{motion.source.removeprefix('position')}")
+    words = (in_python(_as_motion(f"--motion {name}: {note.line()}."), "recommend") for note in notes)
+    return motion, tuple(words)
+
+
+def _as_motion(text: str) -> str:
+    """A message of reading, its option named as `recommend` has it."""
+    return text.replace("--map ", "--motion-map ")
+
+
+def _opened(log: Log | Path, given: Given) -> Opened:
+    """The record; by the encoder's counts only where it cannot be read without, or is certainly in counts."""
+    counts = given.counts_per_rev
+    try:
+        opened = _read(log, given, 0.0)
+    except InputError:
+        if not counts:
+            raise
+        return _read(log, given, counts)
+    view = View(opened.record)
+    if counts and any(f.level == "error" for f in units.counted(view)):
+        return _read(log, given, counts)
+    return opened
+
+
+def _read(log: Log | Path, given: Given, counts: float) -> Opened:
+    """The record, positions in counts of so many a revolution."""
+    if not isinstance(log, Path):
+        how: dict[str, Any] = {"map": given.mapping} if given.mapping else {}
+        how |= {"counts_per_rev": counts} if counts else {}
+        record = positioned(open_log(log, cast("Reading", how)).record)
+        return Opened(record, bool(set(FORCES) & set(record.channels)))
+    try:
+        opened = _of_file(log, given, counts)
+    except InputError:
+        # A torque whose unit needs a number of the drive's is no part of a motion.
+        said = {text.partition("=")[0].strip() for text in given.listed}
+        none = [f"{role}=none" for role in ROLES if role not in MOTION and role not in said]
+        return replace(_of_file(log, replace(given, mapping=[*given.listed, *none]), counts), driven=True)
+    return opened
+
+
+def _of_file(path: Path, given: Given, counts: float) -> Opened:
+    """The record of a file, by the profile kept for its columns where there is one. Nothing is kept of it."""
+    require(path, "record")
+    table, mapping = open_table(path), given.listed
+    said = Drive(counts_per_rev=counts) if counts else Drive()
+    found = profiles.remembered(table) if given.remember else None
+    if found is None:
+        record, notes = record_of(table, mapping, drive=said), list[Finding]()
+    else:
+        kept, recalled = profiles.load(found), None
+        try:
+            numbers = ["counts_per_rev"] if counts else []
+            recalled = remembered.recall(kept, table, mapping, said, numbers, remembered.digest_of_file(path))
+            record = record_of(table, mapping, drive=said, profile=recalled.profile)
+        except InputError as error:
+            raise remembered.blamed(error, found, kept, recalled, mapping) from None
+        notes = remembered.findings_of(found, recalled, mapping, record)
+    record = positioned(record)
+    return Opened(record, bool(set(FORCES) & set(record.channels)), tuple(notes))
+
+
+def _units_of(opened: Opened, given: Given, path: Path | None) -> Iterator[Finding]:
+    """What is doubtful about the units of a motion, and what the saved profile did.
+
+    Raises
+    ------
+    InputError
+        If a unit is certainly wrong.
+    """
+    record = opened.record
+    used = next((n for n in REFERENCES if n in record.channels), "position")
+    view = View(_motion_alone(record))
+    entry = next(
+        (c for c in view.record.meta["reading"]["columns"] if c["channel"] == used), dict[str, Any]()
+    )
+    in_counts = any("counts" in step for step in entry.get("steps", ()))
+    if path and view.stated(used) and record.units[used] != given.unit and not in_counts:
+        raise InputError(
+            f"{path.name}: {view.name(used)!r} is in {record.units[used]}, and the axis moves in {given.unit}; say "
+            f"{view.mapped(used, f'FACTOR{given.unit}')}"
+        )
+    yield from (f for f in opened.notes if f.code != "profile-idle")
+    for finding in _doubts(view, opened.driven):
+        if finding.level == "error":
+            raise InputError(finding.line())
+        yield finding
+    if entry.get("source") == "drive":
+        said = f"{view.name(used)!r} states no unit; it was read as counts, {given.counts_per_rev:g} a revolution"
+        yield Finding("note", "counts", said)
+    if quiet := [c for c in ("time", used) if not view.stated(c)]:
+        taken = ", ".join(f"{view.name(c)!r} as {c} in {'s' if c == 'time' else given.unit}" for c in quiet)
+        remedy = f"say them, such as {view.mapped(quiet[-1], 'UNIT')}"
+        yield Finding(
+            "warning",
+            "assumed-unit",
+            f"the file states no unit that is known; taken were {taken}",
+            "",
+            remedy,
+        )
+
+
+def _motion_alone(record: Record) -> Record:
+    """The record without what is no part of a motion: its units are of no concern."""
+    reading: dict[str, Any] = record.meta.get("reading", {})
+    columns = [c for c in reading.get("columns", ()) if c["channel"] in MOTION]
+    meta = {**record.meta, "reading": {**reading, "columns": columns}}
+    channels = {n: x for n, x in record.channels.items() if n in MOTION}
+    return Record(record.time, channels, {n: record.units[n] for n in channels}, meta)
+
+
+def _doubts(view: View, driven: bool) -> Iterator[Finding]:
+    """What the doctor says of the units, where there are rows enough to tell."""
+    if view.time.size < timing.FEWEST:
+        return
+    with np.errstate(all="ignore"):
+        for finding in (f for check in CHECKS for f in check(view) if f.code in CODES):
+            # Points that somebody wrote down may be far apart; samples of a drive are not.
+            few = finding.code == "time-unit" and not driven and view.time.size < POINTS
+            yield replace(finding, level="warning") if few else finding
