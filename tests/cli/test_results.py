@@ -208,6 +208,28 @@ def test_where_the_model_is_unsure_less_is_promised(
     assert kept[1] > 1.5 * kept[0]
 
 
+def test_a_recommendation_that_no_longer_holds_is_removed_aloud(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was gone without a word, and export then knew of no such file."""
+    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (0.8,))
+    model, out = written(tmp_path / "m.toml"), tmp_path / "recommended.toml"
+    call = ["recommend", str(model), "--amplitude=0.1", "--axes=1", "--confirm=0", f"--out={out}", "--force"]
+    assert main([*call, "--bandwidth=20"]) == 0
+    assert out.is_file()
+    capsys.readouterr()
+    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (0.01,))  # takes nothing away
+    for said in (
+        "nothing is recommended, so the earlier recommendation in it was removed",
+        "so it is not written",
+    ):
+        assert main([*call, "--bandwidth=20", "--no-inertia-feedforward"]) == 0
+        assert said in capsys.readouterr().err
+        assert not out.exists()
+    assert main(["export", str(out), "--to=c99", "--compensator=recommended", f"--out={tmp_path}"]) == 2
+    assert "where nothing is recommended" in capsys.readouterr().err
+
+
 def test_the_demo_goes_the_whole_way(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
     shown = capsys.readouterr().out

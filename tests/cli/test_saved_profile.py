@@ -197,7 +197,9 @@ def test_identify_tells_a_saved_profile_before_the_error_that_comes_of_it(
     assert first.startswith(f"stickslip: right.csv: read by the saved profile {kept}, which says ")
     assert "motor_torque=torque [Nm]:-Nm (the sign turned)" in first
     assert "a saved profile, found by the names of the columns, says motor_torque in -Nm" in second
-    assert "say --map 'motor_torque=torque [Nm]:Nm', if positive torque drives backwards" in second
+    undo = "delete that file, if this log's own sign is right; else"
+    assert f"the profile {kept} turned the sign of motor_torque: {undo}" in second
+    assert f"{undo} say --map 'motor_torque=torque [Nm]:Nm', if positive torque drives backwards" in second
     assert "or --map 'motor_torque=torque [Nm]' --map position=q to leave that out" in second
     assert "; --profile NEW.toml leaves out all that it says" in second
     # What is said now, and read wrongly by the rest of the profile, is told of that, too.

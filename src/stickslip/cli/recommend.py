@@ -22,6 +22,7 @@ from __future__ import annotations
 import argparse
 import math
 import shlex
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -167,9 +168,12 @@ def run(args: argparse.Namespace) -> int:
             compensators=[n.strip() for n in args.compensators.split(",")] if args.compensators else (),
             axes=args.axes, confirm=args.confirm, progress=progress,
         )  # fmt: skip
-    written = args.out and store(args.out, result)
+    written, removed = store(args.out, result) if args.out else (None, False)
     if written:
         _files.written([written])
+    elif args.out:
+        which = "the earlier recommendation in it was removed" if removed else "it is not written"
+        print(f"stickslip: --out {args.out}: nothing is recommended, so {which}", file=sys.stderr)
     if args.json:
         _output.print_json({**result.as_dict(), "file": str(written) if written else None})
         return 0
@@ -182,15 +186,22 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def store(out: Path, result: RecommendationResult) -> Path | None:
-    """Write the recommendation; where there is none, an earlier one must not be taken for it."""
+def store(out: Path, result: RecommendationResult) -> tuple[Path | None, bool]:
+    """Write the recommendation; where there is none, an earlier one, which must not be taken for it, is removed.
+
+    Returns
+    -------
+    tuple of (Path or None, bool)
+        The file written, and whether one was removed.
+    """
     from stickslip.config import read_toml
 
     if result.chosen is not None or result.recommendation.instead is not None:
-        return result.save(out)
+        return result.save(out), False
     if out.is_file() and out.suffix == ".toml" and read_toml(out).has("recommended"):
         out.unlink()
-    return None
+        return None, True
+    return None, False
 
 
 def writable(out: Path, model: Path) -> None:

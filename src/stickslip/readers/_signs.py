@@ -106,6 +106,6 @@ def _said(column: int, text: str, sign: str, decimal: str) -> Finding:
 
 def _mixed(text: str, column: int, other: str) -> InputError:
     return InputError(
-        f"{text!r} in column {column + 1} and {other!r} have a point and a comma, and nothing tells which is the decimal "
-        "sign; write the file with one decimal sign and none between thousands"
+        f"{text!r} in column {column + 1} and {other!r} have a point and a comma, and nothing tells which is the "
+        "decimal sign; write the file with one decimal sign and none between thousands"
     )

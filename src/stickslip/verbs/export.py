@@ -203,6 +203,8 @@ def export(
         compensator = "recommended"
     controller = controller or isinstance(source, Controller) or (whole and compensator is None)
     refuse_controllers(chosen, controller, compensator)
+    if compensator == "recommended":
+        refuse_missing(source)
     content = content_of(source)
     own, renamed = named(chosen, name, content)
     if compensator is None and options.given:
@@ -315,6 +317,20 @@ def refuse_controllers(chosen: Target, controller: bool, compensator: str | None
             )
     if controller and compensator:
         raise InputError("--controller takes the compensator of its file; leave --compensator out")
+
+
+def refuse_missing(source: Source) -> None:
+    """Refuse a recommendation that is not there, and say why it may not be.
+
+    Raises
+    ------
+    InputError
+    """
+    if isinstance(source, (str, os.PathLike)) and not Path(source).exists():
+        raise InputError(
+            f"no file {source}; check the path, or whether `stickslip recommend --out` wrote it: it writes none, and "
+            "removes an earlier one, where nothing is recommended"
+        )
 
 
 def content_of(source: Source) -> Table:

@@ -42,6 +42,13 @@ def _told(finding: Finding, view: View) -> Finding:
     also = "; --profile NEW.toml leaves out all that it says" if saved else ""
     message = f"{finding.message}; {whose} says {units}"
     remedy = f"{finding.remedy}, or {without} to leave that out{also}"
+    turned = [c for c in by if view.columns[c].unit.startswith("-")]
+    if turned and finding.code.endswith("-sign"):
+        # What was said for another file is doubted before this one.
+        profile = f"the profile {_reading(view)['saved_profile']}" if saved else "the profile"
+        undo = "delete that file" if saved else "correct it there"
+        whether = "if this log's own sign is right"
+        remedy = f"{profile} turned the sign of {' and '.join(turned)}: {undo}, {whether}; else {remedy}"
     return replace(finding, message=message, remedy=remedy)
 
 
