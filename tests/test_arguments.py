@@ -131,11 +131,12 @@ FOUND: list[tuple[Callable[..., Any], str]] = [
     (lambda: ss.recommend("a.toml", bandwidth=5.0, loop={"kp": 8.0}), "bandwidth=5.0 cannot be combined with loop, "
      "which sets the gains; leave one out"),
     (lambda: ss.sweep(3), "sweep: file = 3 must be a path or a Sweep"),
-    (lambda: ss.simulate(AXIS, LOOP, SINE, 1.0, initial=0.1), "simulate: initial = 0.1 must be 2 numbers"),
+    (lambda: ss.simulate(AXIS, LOOP, SINE, 1.0, initial=0.1), "simulate: initial = 0.1 must be 2 numbers, "
+     "such as (0.0, 0.0), position (rad) and velocity (rad/s)"),
     (lambda: ss.simulate(AXIS, LOOP, SINE, 1.0, dt=1e-3), "unknown argument of simulate 'dt'; choose from axis, check, "
      "controller, duration, initial, integrator, metered, output, reference, slip_rule, time_step, tolerance"),
     (lambda: ss.simulate(AXIS, LOOP), "simulate: missing a required argument: 'reference'; its arguments are axis, "
-     "check, controller, duration, initial, integrator, metered, output, reference, slip_rule, time_step, tolerance"),
+     "controller, reference, duration, integrator, tolerance, time_step, slip_rule, output, initial, metered, check"),
     (lambda: ss.Reference.table(["a", "b"], [0.0, 1.0]), "Reference.table: time[0] = 'a' must be a number"),
 ]  # fmt: skip
 

@@ -19,6 +19,7 @@ from stickslip.in_python import SIGNALS, in_python
 from stickslip.rules import Rule, Wrong, rule_of
 
 EXAMPLES = {
+    "initial": "(0.0, 0.0), position (rad) and velocity (rad/s)",
     "leave_out": "[(1, 500), 'spikes']", "loop": "{'kp': 8.0, 'kd': 0.08}", "map": "{'position': 'q_deg:deg'}",
     "rows": "(2001, 8000)", "units": "{'position': 'deg', 'torque': 'mNm'}", "values": "{'fc': 0.3}",
 }  # fmt: skip
@@ -153,7 +154,8 @@ def refuse_call(
         for name in kwargs:
             if name not in signature.parameters:
                 raise unknown_argument(owner, name, names) from None
-        raise ParameterError(f"{owner}: {error}; its arguments are {', '.join(names)}") from None
+        ordered = sorted(names, key=[*signature.parameters, *names].index)
+        raise ParameterError(f"{owner}: {error}; its arguments are {', '.join(ordered)}") from None
 
 
 def unknown_argument(owner: str, name: str, names: Sequence[str]) -> UnknownName:

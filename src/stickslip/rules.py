@@ -18,6 +18,8 @@ KINDS = {
     "Compensator": "Feedforward(...) or Feedback(...)",
     "Controller": "a Controller: of gains, Controller(place('PD', ...)), or of control laws",
     "Gains": "Gains, such as place('PD', ...)",
+    "IdentificationResult": "what `identify` returned",
+    "Identified": "what `identify` returned",
     "Machine": "a Machine: load_machine('thesis-dry'), or built of its parts",
     "Model": "a Model, such as Model('coulomb', fc=0.3)",
     "Reference": "a Reference, of arrays Reference.table(time, position)",
@@ -147,7 +149,7 @@ def _union(members: list[Rule | None]) -> Rule | None:
     known = [m for m in members if m is not None]
     if len(known) < len(members):
         return None
-    words = _any_of([m.words for m in known if m.words != "None"])
+    words = _any_of(list(dict.fromkeys(m.words for m in known if m.words != "None")))
 
     def wrong(value: Any) -> Wrong | None:
         found = [m.wrong(value) for m in known]

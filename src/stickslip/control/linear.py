@@ -161,9 +161,10 @@ def place(kind: str, inertia: float, bandwidth: float, damping: float = 1.0) -> 
     ParameterError
         If a number is not positive or the kind is unknown.
     """
-    for name, value in (("inertia", inertia), ("bandwidth", bandwidth), ("damping", damping)):
+    given = (("inertia", inertia, " kg·m²"), ("bandwidth", bandwidth, " Hz"), ("damping", damping, ""))
+    for name, value, unit in given:
         if not value > 0.0 or not math.isfinite(value):
-            raise ParameterError(f"controller: {name} = {value:g} must be greater than 0 and finite")
+            raise ParameterError(f"controller: {name} = {value:g}{unit} must be greater than 0 and finite")
     w = 2.0 * math.pi * bandwidth
     if kind == "PR":
         return pr(inertia * w * w, 2.0 * inertia * damping * w)
@@ -172,7 +173,10 @@ def place(kind: str, inertia: float, bandwidth: float, damping: float = 1.0) -> 
     if kind == "PID":
         spread = 1.0 + 2.0 * damping
         return pid(inertia * w * w * spread, inertia * w**3, inertia * w * spread)
-    raise ParameterError(f"controller: unknown kind {kind!r}; choose from {', '.join(LINEAR)}")
+    meant = (
+        f"did you mean {kind.upper()!r}?" if kind.upper() in LINEAR else f"choose from {', '.join(LINEAR)}"
+    )
+    raise ParameterError(f"controller: unknown kind {kind!r}; {meant}")
 
 
 LINEAR = ("PR", "PD", "PID")

@@ -8,8 +8,9 @@ from typing import Any, cast
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.identify.doctor import Diagnosis, examine
+from stickslip.identify.doctor import Diagnosis, examine, of_arrays
 from stickslip.identify.regression.regressions import Regress
+from stickslip.in_python import in_python
 from stickslip.readers.cut import pieces
 from stickslip.readers.remembered import CODES
 from stickslip.record import Record
@@ -27,9 +28,9 @@ class Examiner:
     said: set[str] = field(default_factory=set[str])
     """Lines that were told."""
 
-    def say(self, name: str, finding: Finding) -> None:
+    def say(self, name: str, finding: Finding, record: Record) -> None:
         """Tell a finding of a log, once."""
-        line = f"{name}: {finding.line()}"
+        line = f"{name}: {in_python(finding.line(), 'identify', of_arrays(record))}"
         if line not in self.said:
             self.said.add(line)
             self.tell(line)
@@ -39,14 +40,14 @@ class Examiner:
         for source in sources:
             for finding in source.findings:
                 if finding.level == "warning":
-                    self.say(source.about["file"] or source.name, finding)
+                    self.say(source.about["file"] or source.name, finding, source.record)
 
     def pieces(self, record: Record, log: Log | None) -> list[Diagnosis]:
         """What it says of a record; several pieces where many rows in a row are left out. What a saved profile did is
         told first: an error may come of it."""
         for data in cast("list[dict[str, Any]]", record.meta.get("reading", {}).get("findings", [])):
             if data["code"] in CODES:
-                self.say(named(log), Finding.from_data(data))
+                self.say(named(log), Finding.from_data(data), record)
         parts, short = pieces(record)
         every = [examine(part, accept=self.accept, regress=self.regress) for part in parts]
         for found in every:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -272,7 +272,9 @@ class IdentificationResult:
         return data_in_python({**self.identification.as_dict(), **self.answers.as_dict()}, "identify")
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The parameters as a data frame: value, lower, upper, unit, identified, verdict.
+        """The parameters as a data frame: value, lower, upper, std, unit, identified, verdict.
+
+        What the table calls not determined has no value (NaN) and no limits (0 and infinity).
 
         Raises
         ------
@@ -281,7 +283,8 @@ class IdentificationResult:
         """
         pandas = needed("pandas", "pandas", "to_pandas() needs")
         columns = ("value", "lower", "upper", "std", "unit", "identified", "verdict")
-        rows = {e.name: [getattr(e, c) for c in columns] for e in self.identification.estimates}
+        told = (_limitless(e) if e.undetermined else e for e in self.identification.estimates)
+        rows = {e.name: [getattr(e, c) for c in columns] for e in told}
         return pandas.DataFrame.from_dict(rows, orient="index", columns=list(columns))
 
     def summary(self) -> str:
@@ -308,6 +311,10 @@ class IdentificationResult:
             f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
             f"<p>Trust: {escape(self.verdict)}</p><ul>{more}</ul></div>"
         )
+
+
+def _limitless(e: Estimate) -> Estimate:
+    return replace(e, value=math.nan, std=math.nan, lower=0.0, upper=math.inf)
 
 
 def _given(h: Held) -> tuple[str, ...]:

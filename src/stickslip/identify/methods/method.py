@@ -126,7 +126,8 @@ class Options:
                 raise InputError(f"--{option} {value:g} must be greater than 0")
         if self.delay is not None and not (math.isfinite(self.delay) and abs(self.delay) < LONGEST_DELAY):
             raise InputError(
-                f"--delay {self.delay:g} s, the time until the torque acts, must lie between -1 and 1 s"
+                f"--delay {self.delay:g} s, the time until the torque acts (below 0 where its column lies behind it), "
+                "must lie between -1 and 1 s"
             )
 
 
