@@ -181,7 +181,7 @@ def test_what_is_refused() -> None:
         {**UNITS, "position_reference": "rad"},
     )
     found = ss.identify(looped, loop={"kp": 1.0}, position_map=True, inverse=True)
-    assert any("leave --loop out" in n for n in found.notes)
+    assert any("leave loop out" in n for n in found.notes)
 
 
 @pytest.mark.slow
