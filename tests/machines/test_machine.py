@@ -158,3 +158,17 @@ def test_a_band_of_velocities_at_rest_is_said_to_be_none_of_a_machines(tmp_path,
     said = capsys.readouterr().err
     assert said.startswith(f"stickslip: note: {file}: law 'karnopp' counts")
     assert said.count("\n") == 1
+
+
+def test_a_delay_is_in_samples_and_one_that_looks_like_seconds_is_remarked(tmp_path):
+    contact = ss.Contact(ss.Model("coulomb", fc=0.1))
+    with pytest.warns(ModelRemark, match=r"2e-06 s late; is it in s\? Then it is 2 samples"):
+        assert ss.Machine("m", 4e-4, contact, delay=2e-3).remark
+    for delay in (0.0, 0.01, 0.5, 1.0):
+        assert not ss.Machine("m", 4e-4, contact, delay=delay).remark
+    with pytest.raises(ParameterError, match=r"from 0 to 1, in samples .* `stability` takes any number"):
+        ss.Machine("m", 4e-4, contact, delay=2.5)
+    path = tmp_path / "late.toml"
+    path.write_text((LIBRARY / "thesis-dry.toml").read_text().replace("delay = 0.0", "delay = 0.0002"))
+    with pytest.warns(ModelRemark, match=r"delay = 0\.0002 is in samples"):
+        machine(path)

@@ -51,6 +51,8 @@ class Sensor:
 
 
 SILENT = Sensor()
+SHORT_DELAY = 0.01
+"""Samples: a delay below may be meant in s."""
 
 
 @constructor_named
@@ -79,11 +81,14 @@ class Machine:
         What the file says about its own numbers.
     switched_off : tuple of str
         Imperfections that `without` left out.
+    delay : float
+        Part of a sample by which a command acts late, 0 to 1, in samples: 0.2 ms at 1 kHz are 0.2.
 
     Warns
     -----
     ModelRemark
-        Where its friction law has a band of velocities at rest (Karnopp), which a machine has not (`remark`).
+        Where its friction law has a band of velocities at rest (Karnopp), which a machine has not, or its delay is so
+        short that it may be in s (`remark`).
     """
 
     name: str
@@ -105,8 +110,12 @@ class Machine:
     encoder: Encoder = EXACT
     sensor: Sensor = SILENT
     delay: Annotated[
-        float, Par("samples", "", "part of a sample by which a command acts late", lower=0.0, upper=1.0)
-    ] = 0.0
+        float,
+        Par(
+            "samples", "", "part of a sample by which a command acts late, in samples and not in s: s over sample_time",
+            lower=0.0, upper=1.0,
+        ),
+    ] = 0.0  # fmt: skip
     filter: Annotated[
         float,
         Par(
@@ -140,7 +149,10 @@ class Machine:
             )
         self._has_springs_to_stiffen()
         if not 0.0 <= self.delay <= 1.0:
-            raise ParameterError(f"machine: delay = {self.delay:g} samples must be from 0 to 1")
+            raise ParameterError(
+                f"machine: delay = {self.delay:g} must be from 0 to 1, in samples (s over sample_time); a longer "
+                "one is not simulated: `stability` takes any number, or give the machine a longer sample_time"
+            )
         if not (self.sample_time > 0.0 and math.isfinite(self.sample_time)):
             raise ParameterError(
                 f"machine: sample_time = {self.sample_time:g} s must be greater than 0 and finite"
@@ -153,7 +165,20 @@ class Machine:
 
     @property
     def remark(self) -> str:
-        """What is not as its friction law says, in a sentence; "" where there is nothing."""
+        """What is seldom meant, or not as its friction law says, in a sentence; "" where there is nothing."""
+        return "; ".join(said for said in (self._short_delay, self._band) if said)
+
+    @property
+    def _short_delay(self) -> str:
+        if not 0.0 < self.delay < SHORT_DELAY:
+            return ""
+        return (
+            f"delay = {self.delay:g} is in samples, so that a command acts {self.delay * self.sample_time:.3g} s late; "
+            f"is it in s? Then it is {self.delay / self.sample_time:g} samples (s over sample_time)"
+        )
+
+    @property
+    def _band(self) -> str:
         law = self.friction.law
         if law.rest_band is None:
             return ""
