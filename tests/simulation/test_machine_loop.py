@@ -270,3 +270,17 @@ def test_what_the_shortest_sub_steps_are_wrong_by_is_told() -> None:
     error = np.abs(run["position"] - axis["position"][axis["event"] == 0.0]).max()
     assert error > 1e-10
     assert error < run.meta["accuracy"]["error_rad"] < 30.0 * error
+
+
+@pytest.mark.parametrize("law", ["gms", "coulomb"])
+def test_a_machine_whose_loop_diverges_says_so_when_it_leaves_every_bound(law: str) -> None:
+    """It ran on until its controller was handed 1e9 rad, or was no longer a number, and told no cure."""
+    friction = ss.Model("gms", **PLANT) if law == "gms" else ss.Model("coulomb", fc=0.285)
+    stiff = ss.Controller(ss.place("PD", INERTIA, 400.0))
+    for limit, cure in ((math.inf, "sample time, or give a torque limit$"), (1e9, "sample time$")):
+        with pytest.raises(
+            Divergence, match=rf"ended at .* every reasonable bound; lower the .* {cure}"
+        ) as error:
+            ss.simulate(ideal(friction), replace(stiff, torque_limit=limit), SINE, 1.0)
+        assert error.value.record is not None
+        assert np.abs(error.value.record["position"]).max() < 1e6

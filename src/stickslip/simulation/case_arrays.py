@@ -50,6 +50,8 @@ MOTION = np.dtype([(name, np.float64) for name in ("position", "velocity", "acce
 AROUND = np.dtype([(name, np.float64) for name in Surroundings._fields])
 """`Surroundings` as a record."""
 
+BOUNDS = (1e6, 1e6)
+"""rad and rad/s, which no real axis leaves: a run that does has diverged."""
 STORM_EVENTS, STORM_TIME = 4000, 5e-3
 """More switches than this within this time (s) end a run."""
 
@@ -231,7 +233,7 @@ def lay_out(
     initial: tuple[float, float] = (0.0, 0.0),
     metered: bool = True,
     max_step: float = math.inf,
-    limits: tuple[float, float] = (1e6, 1e6),
+    limits: tuple[float, float] = BOUNDS,
 ) -> Case:
     """Lay a closed loop out in flat arrays (compiles its laws and reference if they are not cached)."""
     controller = ruled_in(controller, slip_rule)

@@ -169,6 +169,8 @@ def reason(case: Case, ran: Integrated) -> tuple[type[SimulationError], str]:
     kind, why = REASONS[outcome.code]
     if outcome.code == case_arrays.TOO_STIFF:
         why += _in_numbers(case, outcome)
+    elif outcome.code in (case_arrays.DIVERGED, case_arrays.NOT_FINITE):
+        why += f"; {calmed(case.controller.torque_limit, float(case.numbers[case_arrays.SAMPLE_TIME]))}"
     elif outcome.code == case_arrays.NO_TORQUE:
         period = float(case.numbers[case_arrays.SAMPLE_TIME])
         why = no_torque(case.controller, outcome.memory, outcome.time, period)
@@ -182,6 +184,13 @@ def reason(case: Case, ran: Integrated) -> tuple[type[SimulationError], str]:
         elif "time_step" in refused["fixed"]:
             remedies.append("or a longer time_step, with which fixed steps end")
     return kind, f"{why}; try {', '.join(remedies)}"
+
+
+def calmed(torque_limit: float, sample_time: float) -> str:
+    """What keeps a loop of that torque limit (N·m) and sample time (s; 0 in continuous time) from running away."""
+    sooner = " or the sample time" if sample_time > 0.0 else ""
+    limited = ", or give a torque limit" if math.isinf(torque_limit) else ""
+    return f"lower the bandwidth{sooner}{limited}"
 
 
 def _in_numbers(case: Case, outcome: Outcome) -> str:

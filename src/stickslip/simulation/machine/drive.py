@@ -19,7 +19,7 @@ from stickslip.simulation._nodes import (
     REFERENCE_SPEED,
     SPEED,
 )
-from stickslip.simulation.case_arrays import AROUND, MOTION
+from stickslip.simulation.case_arrays import AROUND, BOUNDS, MOTION
 from stickslip.simulation.case_arrays import COLUMNS as OF_AXES
 from stickslip.simulation.case_arrays import UNITS as OF_AXES_UNITS
 from stickslip.simulation.compiled_controller import Sampled
@@ -37,7 +37,9 @@ ROW = np.dtype([(name, np.float64) for name in COLUMNS])
 END = np.dtype([(name, np.float64) for name in (*ITSELF, "motor", "compensating")])
 """One end of a sample: the axis itself, and the torques of motor and compensator, N·m."""
 ENDS = len(END.names or ())
-TRIPPED, NO_NUMBER = 1, 2
+TRIPPED, NO_NUMBER, LEFT = 1, 2, 3
+"""How a run ends early: the drive switches off, the controller gives no number, or the axis leaves every bound."""
+FARTHEST, FASTEST = BOUNDS
 
 
 class Loop(NamedTuple):
@@ -152,6 +154,8 @@ def drive(loop: Loop, samples: int, output: Output) -> int:
         counts[0] = k + 1
         if plant.now.tripped != 0:
             return TRIPPED
+        if abs(end.position) > FARTHEST or abs(end.velocity) > FASTEST:
+            return LEFT
     close_standstill(output.acc, samples * period)
     return 0
 

@@ -26,9 +26,10 @@ from stickslip.record import Record
 from stickslip.rules import is_number
 from stickslip.simulation._meter import new_meter, turning_points
 from stickslip.simulation._nodes import SIGNALS
-from stickslip.simulation.case_arrays import ruled, ruled_in, slip_rules
+from stickslip.simulation.case_arrays import DIVERGED, ruled, ruled_in, slip_rules
 from stickslip.simulation.compiled_controller import Sampled, compiled
-from stickslip.simulation.machine.drive import COLUMNS, TRIPPED, UNITS, Loop, Output, drive
+from stickslip.simulation.integrators import REASONS, calmed
+from stickslip.simulation.machine.drive import COLUMNS, NO_NUMBER, TRIPPED, UNITS, Loop, Output, drive
 from stickslip.simulation.machine.layout import TOLERANCE, lay_out_machine, stand_at
 from stickslip.simulation.machine.plant import FINEST
 from stickslip.simulation.metrics import metrics, settle_band_of
@@ -39,9 +40,6 @@ from stickslip.subset import Layout
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-REASONS = {
-    TRIPPED: "the drive switched off: faster than its encoder follows, or no longer a number",
-}
 FINER = 0.001
 """Of the tolerance, or of the usual one, in the run that one is held against: what is taken in the middle of a sub-step
 grows no coarser with a looser tolerance."""
@@ -121,9 +119,21 @@ def simulate_machine(
     record = Record(columns[0], channels, UNITS, meta)
     if runs[0].code:
         ended = runs[0].ended
-        why = REASONS.get(runs[0].code) or no_torque(controller, runs[0].memory, ended, machine.sample_time)
-        raise Divergence(f"the run ended at {ended:.6g} s: {why}", ended, record)
+        raise Divergence(
+            f"the run ended at {ended:.6g} s: {_why(machine, controller, runs[0])}", ended, record
+        )
     return record
+
+
+def _why(machine: Machine, controller: Controller, ran: _Ran) -> str:
+    """Why a run ended early, with what to do."""
+    if ran.code == NO_NUMBER:
+        return no_torque(controller, ran.memory, ran.ended, machine.sample_time)
+    if ran.code == TRIPPED:
+        return "the drive switched off: faster than its encoder follows, or no longer a number"
+    amplifier = machine.amplifier
+    most = min(controller.torque_limit, amplifier.torque_constant * amplifier.current_limit)
+    return f"{REASONS[DIVERGED][1]}; {calmed(most, machine.sample_time)}"
 
 
 def sub_step_tolerance(machine: Machine, tolerance: float) -> float:

@@ -55,6 +55,7 @@ from stickslip.simulation.sampled.general import (
 from stickslip.simulation.sampled.modes import creep, friction, rest, sign
 from stickslip.simulation.sampled.output import PROGRESS, Grid, Output, measure, put_out, with_room, write
 from stickslip.simulation.sampled.rates import HOLDS, RESTS, SLIPS, STEPS, STUCK, never_sticks
+from stickslip.simulation.sampled.rush import RUNAWAY, rush
 from stickslip.simulation.sampled.slip import slip
 from stickslip.simulation.sampled.stick import stick
 from stickslip.waiting import Reached, watched
@@ -260,7 +261,8 @@ def advance(axis: Any, z: Any, held: Held, plant: Plant, t: float, left: float) 
     if z.mode == STUCK:
         return stick(axis, z, left)
     if z.mode == SLIPS:
-        return slip(axis, z, left)
+        taken = rush(axis, z, left) if z.direction * z.velocity > RUNAWAY else 0.0
+        return taken if taken > 0.0 else slip(axis, z, left)
     if z.mode == RESTS:
         return rest(axis, z, left)
     return creep(axis, z, left)
