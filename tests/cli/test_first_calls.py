@@ -11,7 +11,9 @@ import pytest
 import stickslip
 from stickslip import compiling, jit
 from stickslip.cli import main, parser_of, sweep, warm_up
+from stickslip.control.controller import Controller
 from stickslip.sweep import forecast
+from stickslip.verbs.recommend import loop_of
 
 
 class Clock:
@@ -103,6 +105,19 @@ def test_the_library_warms_up_as_the_command_does(monkeypatch, tmp_path):
     with pytest.raises(stickslip.StickslipError, match="nothing: stickslip: unknown law 'no-such-law'"):
         stickslip.warm_up(told.append)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("loop", ["kp=8,kd=0.1", "kp=8,ki=60,kd=0.1", "kv=40,kvp=0.1,kvi=1,feed=1"])
+@pytest.mark.parametrize("more", ["", ",filter=200,limit=3"])
+def test_warm_up_compiles_the_loops_that_drives_have(loop, more):
+    """A PID with a filter was compiled at its first recommendation."""
+
+    def laws(text):
+        gains, own = loop_of(text)
+        return Controller(gains, velocity_filter=own.get("filter", 0.0), sample_time=1e-3).laws
+
+    warmed = [laws("kp=1,kd=1"), *map(laws, warm_up.LOOPS.values())]  # the demonstration's, and its own
+    assert laws(f"{loop}{more}") in warmed
 
 
 def test_a_long_sweep_says_how_long_before_it_starts(monkeypatch, capsys):

@@ -302,6 +302,12 @@ def test_the_loop_that_the_user_has_goes_all_the_way(
         (["--loop", "kp=1,kd=-1"], "kd = -1 must be a number of 0 or more"),
         (["--loop", "kp=1,limit=2", "--torque-limit", "3"], "--torque-limit 3 and the limit of --loop"),
         (["--amplitude", "0.1", "--motion", "x.csv"], "--motion and --amplitude exclude each other"),
+        (["--loop", "kp=8,kd=0.08,limit=0.1"], "N·m; give a --torque-limit (or limit of --loop) above it"),
+        (["--torque-limit", "0.1"], "N·m; give a --torque-limit above it"),
+        (
+            ["--loop", "kp=8,kd=0.08,filter=500", "--sample-time=1e-3"],
+            "filter = 500 Hz must lie below half the sample",
+        ),
         (["--frequency", "2"], "--frequency 2 needs a sinusoid"),
         (["--loop", "kp=1", "--linear", "PID"], "--linear PID cannot be combined with --loop"),
     ],

@@ -183,6 +183,16 @@ def limited(bursts: int, count: int = 6000) -> Record:
     return Record(t, {"position": np.sin(2.0 * np.pi * 1.7 * t), "motor_torque": torque}, UNITS)
 
 
+def test_of_a_torque_at_its_limit_throughout_no_rows_are_to_be_left_out():
+    """All of them were."""
+    t = 1e-3 * np.arange(6000)
+    position = np.sin(2.0 * np.pi * 1.7 * t)
+    relay = np.where(np.cos(2.0 * np.pi * 1.7 * t) > 0.0, 2.2, -2.2)
+    assert "saturation" not in codes(Record(t, {"position": position, "motor_torque": 0.0 * t + 0.01}, UNITS))
+    found = examine(Record(t, {"position": position, "motor_torque": relay}, UNITS)).findings
+    assert not any("--leave-out" in f.remedy for f in found if f.code == "saturation")
+
+
 @pytest.mark.parametrize(
     ("bursts", "count", "what", "remedy"),
     [

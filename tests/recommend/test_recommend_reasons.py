@@ -21,7 +21,7 @@ from stickslip.recommend.candidates import Bench, Candidate, Setting, rings_alon
 from stickslip.recommend.notes import UNSURE, lag_of, notes_on, sampled_as
 from stickslip.recommend.refusals import held
 from stickslip.recommend.ringing import within_counts
-from stickslip.recommend.sample_time import ROWS, sample_time_for
+from stickslip.recommend.sample_time import ROWS, refuse_filter, sample_time_for
 
 INERTIA = 4e-4
 COULOMB = Model("coulomb", fc=0.05, sigma2=1e-3)
@@ -62,6 +62,18 @@ def test_a_loop_hardly_damped_at_its_records_rows_runs_faster_than_they_were_kep
     assert drive.sample_time_from.startswith(ROWS if kept else f"assumed: sampled every {period:.3g} s")
     asked = [note for note in sampled_as(drive, None) if note.startswith("A loop that is sampled more often")]
     assert len(asked) == kept
+
+
+def test_a_filter_that_its_records_rows_could_not_hold_runs_faster_than_they_were_kept() -> None:
+    def filtered(period: float, told_by: str = "") -> Drive:
+        return replace(drive_of(period, told_by), velocity_filter=300.0)
+
+    period, source = sample_time_for(identified(period=2e-3), None, None, filtered, INERTIA)
+    assert period == pytest.approx(1e-3)
+    assert "could not have its filter of 300 Hz" in source
+    refuse_filter(filtered(period))
+    with pytest.raises(InputError, match=r"filter = 300 Hz must lie below half the sample rate, 250 Hz"):
+        refuse_filter(filtered(2e-3))
 
 
 def test_a_loop_unstable_on_an_inertia_that_is_not_identified_asks_for_the_inertia() -> None:

@@ -209,11 +209,32 @@ def test_a_model_that_misses_the_torque_is_not_called_right() -> None:
     assert said.steps[1].command.startswith("stickslip recommend ")
     assert "misses" in said.trust
     assert "plain least squares (--inverse) explains the torque better where the axis slides" in said.trust
+    assert "in place of" not in said.trust  # its inertia was fitted
     assert not any("alone" in line for line in said.evidence)
     sliding = sliding_of(found)
     assert sliding is not None
     assert sliding.plain == pytest.approx(sliding.rms, rel=0.2)
     assert "%" in next(t["count"] for t in tally(wrong, []) if "gross sliding" in t["words"])
+
+
+def test_an_inertia_that_was_given_is_named_where_the_model_is_beaten() -> None:
+    found = identified()
+    wrong = dataclasses.replace(found, model=Model("coulomb", fc=0.35, sigma2=0.0))
+    held = dataclasses.replace(wrong, estimates=tuple(e for e in wrong.estimates if e.name != "inertia"))
+    given = held.details["mechanics"].inertia
+    assert (
+        f"kg·m² in place of the {given:.3g} that was given: check that first"
+        in answers_of(held, [log()]).trust
+    )
+
+
+def test_along_a_line_it_is_a_force() -> None:
+    found = identified()
+    wrong = dataclasses.replace(found, model=Model("coulomb", fc=0.35, sigma2=0.0))
+    details = {**wrong.details, "axis": dataclasses.replace(wrong.details["axis"], motion="linear")}
+    said = answers_of(dataclasses.replace(wrong, details=details), [log()])
+    assert "the model's force is" in said.evidence[0]
+    assert "explains the force better" in said.trust
 
 
 def test_other_methods_have_words_and_a_next_command() -> None:

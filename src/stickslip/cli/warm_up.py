@@ -3,7 +3,7 @@
 stickslip warm-up
 
 Runs small examples of the other verbs in a temporary folder; the compiled code is kept in the user's cache folder (or
-STICKSLIP_CACHE). Takes a minute or two after an installation, and some seconds if nothing is left to compile.
+STICKSLIP_CACHE). Takes a few minutes after an installation, and some seconds if nothing is left to compile.
 """
 
 from __future__ import annotations
@@ -21,6 +21,14 @@ from stickslip.arguments import arguments_checked
 from stickslip.errors import StickslipError
 
 SUMMARY = "compile everything once after installation"
+LOOPS = {
+    "a PD with a filter": "kp=1.6,kd=0.05,kr=0.05,filter=300",
+    "a PID": "kp=1.6,ki=8,kd=0.05,kr=0.05",
+    "a PID with a filter": "kp=1.6,ki=8,kd=0.05,kr=0.05,filter=300",
+    "a cascade": "kv=60,kvp=0.08,kvi=2",
+    "a cascade with a filter": "kv=60,kvp=0.08,kvi=2,filter=300",
+}
+"""Loops as drives have them, beside the PD of the demonstration: each is compiled with its control laws inside."""
 STEPS: dict[str, Sequence[str]] = {
     "simulation": ("study", "thesis", "--only", "low,signed,nominal", "--no-report"),
     "a drive's controller": ("simulate", "drive.toml"),
@@ -35,16 +43,10 @@ STEPS: dict[str, Sequence[str]] = {
         "--out",
         "two.toml",
     ],
-    "a cascade": [
-        "recommend",
-        "stickslip-demo/model.toml",
-        "--loop",
-        "kv=60,kvp=0.08,kvi=2",
-        "--axes",
-        "2",
-        "--confirm",
-        "3",
-    ],
+    **{
+        what: ["recommend", "stickslip-demo/model.toml", "--loop", gains, "--axes", "2", "--confirm", "3"]
+        for what, gains in LOOPS.items()
+    },
     "rigs": ("rig", "run", "breakaway", "--rig", "thesis-dry"),
     "sweeps": ("sweep", "thesis-robustness", "--cases", "1", "--jobs", "1", "--no-report"),
 }

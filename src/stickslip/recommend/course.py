@@ -181,7 +181,7 @@ def from_rest_to_rest(motion: Motion) -> Motion:
     kept, begin = slice(first, last + 1), float(motion.time[0])
     span = " to ".join(f"{float(t) - begin:.3g}" for t in motion.time[[first, last]])
     own = (x[kept] for x in _points(motion))
-    return Motion(*own, source=f"{motion.source}; of it {span} s, from rest to rest")
+    return Motion(*own, source=f"{motion.source}; of it {span} s behind its begin, from rest to rest")
 
 
 def resting(motion: Motion) -> Iterator[tuple[int, int]]:

@@ -37,15 +37,17 @@ def refuse_weak(found: Identified, drive: Drive) -> None:
     """
     limit, torque = drive.torque_limit, found.unit("N·m")
     converted = AT_THE_LOAD if torque == "N" else ""
+    # A loop of somebody's own may have said it itself.
+    option = "--torque-limit (or limit of --loop)" if drive.gains is not None else "--torque-limit"
     if limit <= (held := breakaway(found.model)):
         raise InputError(
             f"torque limit {limit:g} {torque}: the drive cannot move the axis, whose friction is {held:.3g} {torque}; "
-            f"give a --torque-limit above it{converted}"
+            f"give a {option} above it{converted}"
         )
     if limit <= (friction := resistance(found.model, drive)):
         raise InputError(
             f"torque limit {limit:g} {torque}: the drive cannot follow this motion, along which friction reaches "
-            f"{friction:.3g} {torque}; give a --torque-limit above it, or a slower motion: another --motion, or a "
+            f"{friction:.3g} {torque}; give a {option} above it, or a slower motion: another --motion, or a "
             f"smaller --amplitude or --frequency{converted}"
         )
 

@@ -56,12 +56,38 @@ def sample_time_for(
         return USUAL_TIME, f"assumed, as the model does not contain its record's; {OWN}"
     record = f"the record {file}" if file else "the identified record"
     # Gains do not depend on it, and a bandwidth that is too high for it is no error yet.
+    corner = sampled(USUAL_TIME).velocity_filter if period > USUAL_TIME else 0.0
+    if not below_half_the_rate(corner, period):
+        return USUAL_TIME, (
+            f"assumed: sampled every {period:.3g} s, as {record} has rows, this loop could not have its filter of "
+            f"{corner:g} Hz, so that it is taken to run faster than the record was kept; {OWN}"
+        )
     if period > USUAL_TIME and inertia and hardly_damped(sampled(USUAL_TIME).loop(inertia), period, inertia):
         return USUAL_TIME, (
             f"assumed: sampled every {period:.3g} s, as {record} has rows, this loop would be unstable or hardly "
             f"damped, so that it is taken to run faster than the record was kept; {OWN}"
         )
     return period, f"{ROWS} {record}; {OWN}"
+
+
+def below_half_the_rate(corner: float, period: float) -> bool:
+    """Whether a low-pass of this corner, Hz, filters anything at a sample time, s; 0: there is none."""
+    return corner < 0.5 / period
+
+
+def refuse_filter(drive: Drive) -> None:
+    """Refuse a filter of the loop that lies above what its samples hold.
+
+    Raises
+    ------
+    InputError
+    """
+    corner, period = drive.velocity_filter, drive.sample_time
+    if not below_half_the_rate(corner, period):
+        raise InputError(
+            f"--loop: filter = {corner:g} Hz must lie below half the sample rate, {0.5 / period:g} Hz at a sample time "
+            f"of {period:g} s; give a lower corner, or the drive's --sample-time"
+        )
 
 
 def hardly_damped(loop: Controller, period: float, inertia: float) -> bool:

@@ -29,7 +29,7 @@ from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 from stickslip.report.next_steps import Step, next_steps
 from stickslip.report.plots import quantity
-from stickslip.report.sliding_torque import WORSE, Sliding, beaten, sliding_of
+from stickslip.report.sliding_torque import WORSE, Sliding, beaten, beside_held_inertia, sliding_of
 
 ELSEWHERE = 1.5
 """Times the force error of the fitted records, from which on that of held-out ones is one of another machine."""
@@ -220,11 +220,12 @@ def trusted(found: Identification, reasons: Sequence[str]) -> str:
 
 def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
     """What speaks against the numbers, in a few words each."""
-    out: list[str] = []
+    out, effort = list[str](), "force" if linear(found) else "torque"
     if sliding is not None and sliding.relative > ROUGH:
-        out.append(f"the model misses {percent(sliding.relative)} of the torque even where the axis slides")
+        out.append(f"the model misses {percent(sliding.relative)} of the {effort} even where the axis slides")
     if sliding is not None and beaten(sliding):
-        out.append("plain least squares (--inverse) explains the torque better where the axis slides")
+        better = f"plain least squares (--inverse) explains the {effort} better where the axis slides"
+        out.append(f"{better}{beside_held_inertia(found, unit_in(found, 'kg·m²'))}")
     fall = missing_fall(found.misfit)
     if fall > 0.0 and found.model is not None:
         out.append(
@@ -233,7 +234,7 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
         )
     plain = found.misfit.get("inverse_dynamics_relative", math.nan)
     if sliding is None and found.misfit.get("force_relative", 0.0) > WORSE * plain:
-        out.append("the model's torque is farther from the measured one than plain least squares'")
+        out.append(f"the model's {effort} is farther from the measured one than plain least squares'")
     held, own = (found.misfit.get(f"{p}force_relative", math.nan) for p in ("held_out_", ""))
     if held > ELSEWHERE * own:
         out.append(f"on records held out its force error is {percent(held)}, {percent(own)} on those fitted")
@@ -271,15 +272,15 @@ def percent(share: float) -> str:
 
 def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
     """How far the model's torque is from the measured one, in sentences."""
-    out: list[str] = []
+    out, effort = list[str](), "force" if linear(found) else "torque"
     unit, regression = unit_in(found, "N·m"), found.details.get("regression")
     if sliding is not None:
         speeds = (
             within_speeds(regression, unit_in(found, "rad/s")) if isinstance(regression, Regression) else ""
         )
         out.append(
-            f"In gross sliding ({100.0 * sliding.share:.0f} % of the record{speeds}) the model's "
-            f"torque is {percent(sliding.relative)} off the measured one, {quantity(sliding.rms, unit)} root mean "
+            f"In gross sliding ({100.0 * sliding.share:.0f} % of the record{speeds}) the model's {effort} is "
+            f"{percent(sliding.relative)} off the measured one, {quantity(sliding.rms, unit)} root mean "
             f"square{plain_there(sliding)}."
         )
     out += force_errors(found.misfit, sliding is not None and not beaten(sliding))

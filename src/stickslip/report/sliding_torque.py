@@ -168,3 +168,15 @@ def over_all_rows(found: Identification) -> Sliding | None:
 def beaten(sliding: Sliding) -> bool:
     """Whether plain least squares explains the torque better even in gross sliding."""
     return sliding.relative > SMALL and sliding.rms > WORSE * sliding.plain
+
+
+def beside_held_inertia(found: Identification, unit: str) -> str:
+    """That an inertia that was given, and not fitted, may be why the model is beaten; empty where it was fitted."""
+    mechanics, inverse = found.details.get("mechanics"), found.details.get("inverse")
+    fitted = any(e.name == "inertia" for e in found.estimates)
+    if fitted or not isinstance(mechanics, Mechanics) or not isinstance(inverse, InverseDynamics):
+        return ""
+    return (
+        f", with an inertia of {inverse['inertia']:.3g} {unit} in place of the {mechanics.inertia:.3g} that was given: "
+        "check that first"
+    )

@@ -22,7 +22,7 @@ from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
 from stickslip.recommend import recommend as setting
 from stickslip.recommend.candidate_run import Drive
-from stickslip.recommend.sample_time import sample_time_for
+from stickslip.recommend.sample_time import refuse_filter, sample_time_for
 from stickslip.verbs.candidates_given import Given, compensators_of, made_for
 from stickslip.verbs.compare import IdentifiedModel, identified_of
 from stickslip.verbs.motion_given import Given as MotionGiven
@@ -175,6 +175,7 @@ def recommend(
 
         known_inertia = inertia or found.axis.get("inertia")
         drive = sampled(*sample_time_for(found, sample_time, at_hand, sampled, known_inertia))
+        refuse_filter(drive)
     if at_hand is not None:
         most = at_hand.limits.get("torque", math.inf)
         drive = replace(drive, machine=at_hand, torque_limit=min(drive.torque_limit, most))

@@ -67,6 +67,8 @@ def saturated(view: View) -> Iterator[Finding]:
         if not view.has(channel) or (channel == "current" and view.from_current):
             continue
         values = view.values(channel)
+        if values.size and not np.ptp(values) > 0.0:
+            continue  # What never changes is no signal cut off: its own check says so.
         tops = _flat_tops(values)
         if tops is None or (channel == "velocity" and not _outrun(view, values, tops[0])):
             continue
@@ -92,6 +94,8 @@ def _cut_off(view: View, channel: str, at: Mask, limits: str) -> Finding:
     )
     gentler = "slower moves" if channel == "velocity" else "gentler accelerations"
     remedy = f"what was cut off is lost: record again with {gentler}"
+    if bool(np.all(at)):
+        return Finding("warning", "saturation", message, remedy=remedy)
     if not many:
         return Finding(
             "warning", "saturation", message,
