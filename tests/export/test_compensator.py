@@ -21,6 +21,8 @@ from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import virtual_rig
 from stickslip.simulation.closed_loop import simulate
+from stickslip.simulation.compiled_controller import compiled, replay
+from stickslip.spec import Surroundings
 
 MODEL = """law = "coulomb"
 [parameters]
@@ -182,3 +184,23 @@ def test_a_simulation_unit_is_titled_by_what_it_holds(gain, what):
     made = ss.export(Controller(Gains(kp=gain), Feedforward(COULOMB), sample_time=1e-3), to="fmu")
     assert made.target.title == f"FMI 2.0 and 3.0 co-simulation unit of a sampled {what}"
     assert ss.export(COULOMB, to="fmu").target.title.endswith("a contact that is moved")
+
+
+@pytest.mark.parametrize("to", ["c99", "st", "matlab", "python", "arduino", "fmu"])
+def test_a_friction_that_is_fed_forward_says_that_the_reference_must_rest_at_zero(to):
+    """A reference velocity of -1e-9 rad/s at rest gave the whole friction, and no README said so."""
+    said = "At rest the reference velocity must be exactly 0"
+    forward = ss.export(COULOMB, to, compensator="ff", deadband=0.01).files["README.md"]
+    assert said in forward
+    assert "`feedforward_deadband` (`stickslip export --compensator ff --deadband RAD_PER_S`" in forward
+    assert said not in ss.export(COULOMB, to, compensator="fb").files["README.md"]
+
+
+@pytest.mark.parametrize(("deadband", "given"), [(0.0, -0.25), (1e-6, 0.0)])
+def test_a_deadband_above_the_noise_of_the_reference_velocity_keeps_it_at_rest(deadband, given):
+    law = Model("coulomb", fc=0.25, sigma2=0.02)
+    made = Controller(Gains(kp=0.0), Feedforward(law, deadband=deadband), sample_time=1e-3)
+    sampled = compiled(made)
+    inputs, torque = np.tile([0.0, 0.0, -1e-9, 0.0], (3, 1)), np.zeros(3)
+    replay(sampled, inputs, np.array(Surroundings()), sampled.fault, torque, np.zeros(3))
+    assert torque[-1] == pytest.approx(given, abs=1e-3)

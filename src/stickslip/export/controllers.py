@@ -136,6 +136,27 @@ def _gives(part: str, block: ControlBlock) -> str:
     return f"the torque of `{part}` ({block.law.title})"
 
 
+def at_rest(controller: Controller) -> str:
+    """What the reference velocity must be at rest for a friction that is fed forward, for people; empty without one."""
+    fed = {
+        part: b.own for part, b in controller.blocks.items() if b.friction and b.law.place == "feedforward"
+    }
+    if not any(own.get("gain", 1.0) for own in fed.values()):
+        return ""
+    said = (
+        "At rest the reference velocity must be exactly 0: the feedforward takes -1e-9 rad/s for motion, too, and a "
+        "law that jumps at rest then gives the whole friction."
+    )
+    names = [f"`{part}_deadband`" for part, own in fed.items() if "deadband" in own]
+    if not names:
+        return said
+    option = " (`stickslip export --compensator ff --deadband RAD_PER_S`, in Python `deadband=`)"
+    return (
+        f"{said} Where it is not, {' and '.join(names)}{option if compensates_alone(controller) else ''} must be set "
+        "above the noise of the reference velocity."
+    )
+
+
 def laws_of(controller: Controller) -> list[str]:
     """Its laws, a line each."""
     return [
@@ -166,7 +187,7 @@ def head_of(controller: Controller, name: str) -> dict[str, Any]:
     return {
         "x": checked_name(name), "laws": laws_of(controller), "sample_time": controller.sample_time,
         "table": [*table_of(controller)], "given": given_by(controller), "alone": compensates_alone(controller),
-        "depends": depends_on(controller),
+        "depends": depends_on(controller), "at_rest": at_rest(controller),
     }  # fmt: skip
 
 
