@@ -99,7 +99,7 @@ def motion_in(log: Log, given: Given = Given()) -> tuple[Motion, tuple[str, ...]
         If it cannot be read, does not move, or its numbers are certainly in another unit than they are taken in.
     """
     source: Any = log
-    path = Path(source) if isinstance(source, (str, os.PathLike)) else None
+    path = Path(cast("str", source)) if isinstance(source, (str, os.PathLike)) else None
     name = path.name if path else "the motion given"
     try:
         opened = _opened(path or log, given)
