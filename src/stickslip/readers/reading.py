@@ -17,6 +17,7 @@ from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.readers import profiles
 from stickslip.readers._choose import Choice, choose, meant, parse_mapping
+from stickslip.readers._names import ROLES
 from stickslip.readers.convert import Drive, convert, times_of
 from stickslip.readers.table_columns import Column, Format, Table
 from stickslip.record import Record
@@ -34,6 +35,8 @@ FORMATS = (
     "csv_text",
 )
 """One file a format, asked in this order; text is last, since anything may be text."""
+CHANNELS = ROLES
+"""What the columns of a file may be."""
 PER_MILLE = re.compile(r"(?i)(?<![0-9a-f])60(?:77|b2)(?![0-9a-f])")
 """Objects of CiA 402 (IEC 61800-7-201) in thousandths of the rated torque: actual torque, torque offset."""
 

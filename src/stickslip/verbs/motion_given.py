@@ -17,10 +17,9 @@ from stickslip.identify.doctor.view import View
 from stickslip.identify.motion import REFERENCES, Motion, motion_of
 from stickslip.in_python import in_python
 from stickslip.readers import profiles, remembered
-from stickslip.readers._names import ROLES
 from stickslip.readers.convert import Drive
 from stickslip.readers.derive import positioned
-from stickslip.readers.reading import open_table, record_of
+from stickslip.readers.reading import CHANNELS, open_table, record_of
 from stickslip.recommend.course import measured
 from stickslip.record import Record
 from stickslip.verbs.kinds import require
@@ -149,7 +148,7 @@ def _read(log: Log | Path, given: Given, counts: float) -> Opened:
     except InputError:
         # A torque whose unit needs a number of the drive's is no part of a motion.
         said = {text.partition("=")[0].strip() for text in given.listed}
-        none = [f"{role}=none" for role in ROLES if role not in MOTION and role not in said]
+        none = [f"{role}=none" for role in CHANNELS if role not in MOTION and role not in said]
         return replace(_of_file(log, replace(given, mapping=[*given.listed, *none]), counts), driven=True)
     return opened
 
