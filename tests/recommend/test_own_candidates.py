@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import pytest
 from test_recommend_beside import THESIS, known
@@ -16,7 +17,7 @@ from stickslip.control.linear import Gains
 from stickslip.control.written import tables_of
 from stickslip.errors import InputError, UnknownName
 from stickslip.recommend import recommend as recommending
-from stickslip.recommend.beside import Own, belief_of, fed
+from stickslip.recommend.beside import Beside, Own, belief_of, fed
 from stickslip.recommend.file import write_setting
 from stickslip.recommend.recommend import Drive, recommend
 from stickslip.report.recommendation_text import beside_lines
@@ -87,6 +88,16 @@ def test_a_law_of_ones_own_is_switched_on_and_written(file, tmp_path):
     assert any("mine" in line and "<- yes" in line for line in beside_lines(advice))
     written = write_setting(tmp_path / "recommended.toml", FOUND, advice)
     assert tables_of(read_controller(written)) == tables_of(own.controller)
+
+
+def test_what_leaves_as_little_as_the_setting_is_not_said_to_leave_more():
+    one = Beside("mine", "", (0.02,), "", None)
+    chosen = SimpleNamespace(worst=0.021)
+    (_, _, row, _) = beside_lines(SimpleNamespace(beside=(one,), instead=None, chosen=chosen, hunts=""))
+    assert row.endswith("no: it leaves hardly less")
+    chosen.worst = 0.01
+    (_, _, row, _) = beside_lines(SimpleNamespace(beside=(one,), instead=None, chosen=chosen, hunts=""))
+    assert row.endswith("no: another one leaves less")
 
 
 def test_a_controller_runs_as_the_drive_does():

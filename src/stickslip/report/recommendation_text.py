@@ -123,7 +123,9 @@ def beside_lines(result: Recommendation) -> list[str]:
         numbers = (
             f"{100 * b.errors[0]:>8.1f} %  {100 * b.worst:>5.1f} %" if b.errors else f"{'–':>10}  {'–':>7}"
         )
-        mark = "<- yes" if b is result.instead else f"no: {b.why_not or 'another one leaves less'}"
+        hardly = result.instead is None and result.chosen is not None and b.at_most <= result.chosen.worst
+        why = b.why_not or ("it leaves hardly less" if hardly else "another one leaves less")
+        mark = "<- yes" if b is result.instead else f"no: {why}"
         out.append(f"{b.label:<22}{numbers}  {mark}")
     taken = result.instead
     if taken is None:
