@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.identify.monte_carlo import sliding_torque
+from stickslip.identify.monte_carlo import resisting_torque
 
 MOVING = np.array([[-2.0, -0.1, -1e-6], [1e-6, 0.05, 3.0]])
 MODELS = [ss.Model(ss.law(name), **ss.law(name).example) for name in ss.law_names() if ss.law(name).steady]
@@ -18,7 +18,7 @@ MODELS = [ss.Model(ss.law(name), **ss.law(name).example) for name in ss.law_name
 def test_it_is_the_torque_that_curves_are_fitted_to(model: ss.Model) -> None:
     said = model.sliding_torque(MOVING)
     assert said.shape == MOVING.shape
-    assert np.allclose(said.reshape(-1), sliding_torque(model, MOVING.reshape(-1)), rtol=1e-9)
+    assert np.allclose(said.reshape(-1), resisting_torque(model, MOVING.reshape(-1)), rtol=1e-9)
     one = model.sliding_torque(3.0)
     assert isinstance(one, float)
     assert one == said[1, 2]

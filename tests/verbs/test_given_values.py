@@ -9,6 +9,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
+from support.written_log import written
 
 FC = 0.3
 
@@ -52,9 +53,7 @@ def test_what_is_given_stands_beside_what_was_fitted(log: dict[str, np.ndarray],
 def test_the_command_says_what_was_given(
     log: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = tmp_path / "log.csv"
-    head = "time [s],position [rad],motor_torque [N·m]"
-    np.savetxt(file, np.stack(list(log.values()), axis=1), "%.9f", ",", header=head, comments="")
+    file = written(log, tmp_path)
     command = ["identify", str(file), "--law", "coulomb", "--no-report", "--out", str(tmp_path / "m.toml")]
     assert main([*command, "--freeze", "fc"]) == 2
     assert "give --set fc=.." in capsys.readouterr().err

@@ -13,6 +13,7 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.finding import Finding
+from support.written_log import written
 
 OPTION = re.compile(r"--[a-z]")
 WEIGHT, FC = 0.4, 0.1
@@ -48,9 +49,7 @@ def test_gravity_that_nobody_named_is_the_first_thing_to_do(
 def test_the_command_names_gravity_first_too(
     joint: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = tmp_path / "log.csv"
-    head = "time [s],position [rad],motor_torque [N·m]"
-    np.savetxt(file, np.stack(list(joint.values()), axis=1), "%.9f", ",", header=head, comments="")
+    file = written(joint, tmp_path)
     main(["identify", str(file), "--law", "coulomb", "--no-report", "--out", str(tmp_path / "m.toml")])
     steps = [x for x in capsys.readouterr().out.splitlines() if x.startswith(("next", "measure next"))]
     assert "--pendulum" in steps[0]
@@ -102,9 +101,7 @@ def test_a_verdict_names_the_argument(unweighed: ss.IdentificationResult) -> Non
 def test_what_is_found_is_told_by_the_command_in_its_words(
     joint: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = tmp_path / "log.csv"
-    head = "time [s],position [rad],motor_torque [N·m]"
-    np.savetxt(file, np.stack(list(joint.values()), axis=1), "%.9f", ",", header=head, comments="")
+    file = written(joint, tmp_path)
     main(["doctor", str(file)])
     assert "--pendulum" in capsys.readouterr().out
 

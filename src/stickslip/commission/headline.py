@@ -10,7 +10,7 @@ import numpy as np
 from stickslip.analyse.wording import ends
 from stickslip.commission.recommended import NONE_SAFE
 from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.monte_carlo import sliding_torque
+from stickslip.identify.monte_carlo import resisting_torque
 
 if TYPE_CHECKING:
     from stickslip.commission.commission import Commissioned
@@ -45,7 +45,7 @@ def friction(found: Commissioned) -> str:
     sliding = found.stage("sliding").found
     slow, fast = sliding.details.get("speeds", (math.nan, math.nan)) if sliding else (math.nan, math.nan)
     if math.isfinite(slow):
-        low, high = sliding_torque(found.model, np.array([slow, fast])).tolist()
+        low, high = resisting_torque(found.model, np.array([slow, fast])).tolist()
         text += f"; slides at {low:.3g} N·m at {slow:.3g} rad/s and {high:.3g} N·m at {fast:.3g} rad/s"
     return f"{text} (mean of both directions; {found.model.law.title or found.model.law.name})."
 

@@ -102,7 +102,7 @@ def with_values(model: Model, named: Mapping[str, float]) -> Model:
     return Model(model.law, **values)
 
 
-def sliding_torque(model: Model, velocity: Array) -> Array:
+def resisting_torque(model: Model, velocity: Array) -> Array:
     """Torque at constant velocities (break-away at 0, towards the positive side), N·m, shape (n,)."""
     side = np.where(velocity < 0.0, -1.0, 1.0)
     return Steady(model.law, velocity, side).torque(np.asarray(model.law.pack(model.parameters), np.float64))

@@ -69,9 +69,9 @@ def parse_mapping(mapping: Mapping[str, str] | Sequence[str]) -> dict[str, str]:
     for written, column in pairs:
         role = ALIASES.get(written.strip(), written.strip())
         if role not in KINDS:
-            known = [*ROLES, *ALIASES]
-            remedy = "did you mean 'time'?" if written.strip() == "t" else suggestion(written, known)
-            raise InputError(f"--map names the unknown channel {written!r}; {remedy}")
+            raise InputError(
+                f"--map names the unknown channel {written!r}; {suggestion(written, [*ROLES, *ALIASES])}"
+            )
         if role in out:
             raise InputError(f"--map gives {role} twice; give it once")
         out[role] = column.strip()

@@ -55,6 +55,7 @@ KINDS: dict[str, tuple[str, ...]] = {
 ROLES = tuple(KINDS)
 
 ALIASES = {
+    "t": "time",
     "torque": "motor_torque",
     "force": "motor_torque",
     "friction": "friction_torque",

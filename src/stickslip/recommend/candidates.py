@@ -16,7 +16,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.friction_levels import static_level
 from stickslip.identify.fit.parallel import in_turn
-from stickslip.identify.monte_carlo import sliding_torque
+from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 from stickslip.recommend.candidate_run import Drive, Trial, dangers, rings, run
@@ -313,7 +313,7 @@ def resistance(model: Model, drive: Drive) -> float:
     if not model.law.steady:
         return 0.0
     v = drive.path.top_speed * np.concatenate([np.linspace(0.0, 1.0, 200), -np.linspace(1e-9, 1.0, 200)])
-    return max(breakaway(model), float(np.max(np.abs(sliding_torque(model, v)))))
+    return max(breakaway(model), float(np.max(np.abs(resisting_torque(model, v)))))
 
 
 def rings_alone(bench: Bench, inertia: float, torque: str) -> str:

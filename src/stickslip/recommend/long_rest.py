@@ -96,6 +96,11 @@ def hunts_alone(bench: Bench, torque: str) -> str:
     return f"at rest {on} within {RESTS:g} s ({size}): {why}"
 
 
+def long_rests(loop: Controller) -> int:
+    """Runs at rest for long, of the loop alone and with what is recommended, about."""
+    return 2 * ASKED * len(OFF) if integrates(loop) else 0
+
+
 def integrates(loop: Controller) -> bool:
     """Whether a part of the loop grows as long as there is an error."""
     if loop.gains is not None:

@@ -29,7 +29,7 @@ from stickslip.recommend.candidates import (
     on_both,
     rings_alone,
 )
-from stickslip.recommend.long_rest import hunts_alone, hunts_with, unsure_at_rest
+from stickslip.recommend.long_rest import hunts_alone, hunts_with, long_rests, unsure_at_rest
 from stickslip.recommend.motion_notes import by_reference_velocity, on_motion
 from stickslip.recommend.notes import (
     ALLOWANCE,
@@ -109,8 +109,10 @@ def recommend(
     fed = j if feed_inertia and not linear.answers_to_acceleration else 0.0
     tried = (*inertia_alone(found.model, fed), *settings_of(laws, drive, fed, GAINS))
     settings = [replace(setting, offset=offset) for setting in tried]
-    # Each with the linear controller alone; then leads, the guard and the gains beyond.
-    more = (axes + 1) * (len(LEADS) + 1 + len(BEYOND)) + (confirm + 1) * (4 + len(BEYOND))
+    # Each with the linear controller alone; then leads, the guard, the gains beyond and long rests.
+    more = (
+        (axes + 1) * (len(LEADS) + 1 + len(BEYOND)) + (confirm + 1) * (4 + len(BEYOND)) + long_rests(linear)
+    )
     account = Account(progress, len(settings), axes + 1, more)
     refuse_endless(account.total, drive, axes, confirm)
     bench, others = (

@@ -21,7 +21,7 @@ from stickslip.identify.axis.loop_check import OTHER_LOOP
 from stickslip.identify.axis.problem import mechanics_parameters
 from stickslip.identify.axis.result import perhaps_a_weight
 from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.monte_carlo import sliding_torque
+from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.identify.motion import speeds_of
 from stickslip.identify.regression.drifting import DRIFTS_BY, drift_of
 from stickslip.identify.regression.regression import Regression
@@ -151,7 +151,7 @@ def friction_in(found: Identification, records: Sequence[Record]) -> list[str]:
         return []
     torque, speed = unit_in(found, "N·m"), unit_in(found, "rad/s")
     sides = {
-        name: sign * sliding_torque(model, sign * np.array([tenths[1], tenths[5], tenths[-1]]))
+        name: sign * resisting_torque(model, sign * np.array([tenths[1], tenths[5], tenths[-1]]))
         for (name, tenths), sign in zip(speeds.items(), (1.0 if n == "positive" else -1.0 for n in speeds), strict=True)
     }  # fmt: skip
     same = len(sides) == 2 and np.allclose(*(at_same(found, speeds, s) for s in (1.0, -1.0)), rtol=1e-3)
@@ -173,7 +173,7 @@ def friction_in(found: Identification, records: Sequence[Record]) -> list[str]:
 def at_same(found: Identification, speeds: Mapping[str, Sequence[float]], side: float) -> Any:
     """Friction in one direction at the speeds of the other."""
     assert found.model is not None
-    return side * sliding_torque(found.model, side * np.array(speeds["positive"]))
+    return side * resisting_torque(found.model, side * np.array(speeds["positive"]))
 
 
 def one_number_each(estimates: Iterable[Estimate]) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from stickslip.identify.axis.problem import PLACE, measured
 from stickslip.identify.axis.search import FittedAxis
 from stickslip.identify.estimate import Identification, Picture, Trace
-from stickslip.identify.monte_carlo import curve_band, sliding_torque
+from stickslip.identify.monte_carlo import curve_band, resisting_torque
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.record import Record
 from stickslip.report.axis_evidence import measured_friction, slow_rows
@@ -255,7 +255,7 @@ def curve_picture(
     places = [i for i, e in enumerate(found.estimates) if e in own]
     grid = np.geomspace(1e-3 * top, top, 150)
     known = found.correlation[np.ix_(places, places)]
-    best = [side * sliding_torque(found.model, side * grid) for side in (1.0, -1.0)]
+    best = [side * resisting_torque(found.model, side * grid) for side in (1.0, -1.0)]
     same = bool(np.allclose(*best, rtol=1e-6))
     traces: list[Trace] = []
     banded = False

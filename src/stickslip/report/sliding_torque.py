@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip.identify.estimate import Identification
 from stickslip.identify.fit.smooth import seen
-from stickslip.identify.monte_carlo import sliding_torque
+from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.identify.regression.force_error import model_torque
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
@@ -97,7 +97,7 @@ def sliding_of(found: Identification) -> Sliding | None:
     columns = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
     velocity = columns["velocity"]
     record = np.repeat(np.arange(len(parts)), [p["time"].size for p in parts])
-    steady = sliding_torque(found.model, velocity)
+    steady = resisting_torque(found.model, velocity)
     sizes = [
         (r.signals.time.size, r.places.size * max(1, int(r.window.width / r.signals.period))) for r in rows
     ]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.estimate import Identification, Picture, Trace
-from stickslip.identify.monte_carlo import sliding_torque
+from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.report.plots import envelope, quantity
 from stickslip.report.sliding_torque import Sliding
 
@@ -109,7 +109,7 @@ def over_velocity(sliding: Sliding, found: Identification, motion: str) -> Pictu
     x, y = sliding.velocity[::step], (sliding.measured - sliding.inertial)[::step]
     grid = [np.linspace(low, high, 120) for low, high in sides_of(sliding.velocity)]
     v = np.concatenate(grid)
-    curve = sliding_torque(model, v) + mechanics.offset
+    curve = resisting_torque(model, v) + mechanics.offset
     cuts = np.cumsum([g.size for g in grid])[:-1]
     word = "force" if motion == "linear" else "torque"
     mass = "mass" if motion == "linear" else "inertia"

@@ -260,7 +260,7 @@ def checked(result: PredictionError | Fitted, evidence: Evidence) -> tuple[tuple
     if sliding is not None:
         scale = result.vector.signed_scale(sliding.friction)
         estimates, said = agreed(estimates, sliding, result.vector, inverse, scale)
-        if not sliding.held_for(HELD) or sliding.bands[0].gives:
+        if not sliding.held_for(HELD) or sliding.bands[0].may_give:
             why = IN_SERIES if sliding.held_for(HELD) else ONLY_REVERSALS
             estimates = untold_by_reversals(estimates, result.model, sliding, why)
         u = result.vector.coordinates(

@@ -26,7 +26,7 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import told_by
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.fit.smooth import root_mean_square
-from stickslip.identify.monte_carlo import sliding_torque
+from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.identify.regression.bands import GAUSSIAN
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics
@@ -176,7 +176,7 @@ def left_of(sliding: Regression, model: Model, mechanics: Mechanics) -> Array:
         "inertia": mechanics.inertia, "sigma2": 0.0, "fc": 0.0, "offset": mechanics.offset,
         "gravity_sin": weight * math.cos(angle), "gravity_cos": -weight * math.sin(angle),
     }  # fmt: skip
-    return sliding.remainder(frictionless) - sliding_torque(model, stacked(sliding.rows, "speed"))
+    return sliding.remainder(frictionless) - resisting_torque(model, stacked(sliding.rows, "speed"))
 
 
 def left_where_it_slides(sliding: Regression, model: Model, mechanics: Mechanics) -> dict[str, float]:

@@ -26,7 +26,7 @@ from stickslip.identify.compare.text import lines
 from stickslip.identify.compare.trains import on_trains
 from stickslip.identify.estimate import Estimate, Picture, Trace
 from stickslip.identify.identified_file import Identified, covariance
-from stickslip.identify.monte_carlo import curve_band, sliding_torque
+from stickslip.identify.monte_carlo import curve_band, resisting_torque
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -278,7 +278,7 @@ def compared_curves(
     sides: list[tuple[Array, Array]] = []
     for seed, model in enumerate((first, second)):
         drawn = curve_band(model.model, *believed(model), velocity, DRAWS, seed)
-        sides.append((sliding_torque(model.model, velocity), drawn))
+        sides.append((resisting_torque(model.model, velocity), drawn))
     count = min(len(drawn) for _, drawn in sides)
     if count < 20:
         raise InputError(

@@ -17,7 +17,7 @@ from stickslip.identify.compare.same_turn import ANGLE
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.identified_file import Identified
-from stickslip.identify.monte_carlo import curve_band, sliding_torque
+from stickslip.identify.monte_carlo import curve_band, resisting_torque
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -122,7 +122,7 @@ def levels_of(first: Identified, second: Identified, low: float, high: float) ->
     if all(any(e.name == "fs" and e.identified for e in m.estimates) for m in (first, second)):
         points, names = [0.0, *points], ["break-away", *names]
     velocity = np.array(points)
-    best = [sliding_torque(m.model, velocity) for m in (first, second)]
+    best = [resisting_torque(m.model, velocity) for m in (first, second)]
     drawn = [
         curve_band(m.model, *believed(m), velocity, DRAWS, seed) for seed, m in enumerate((first, second))
     ]

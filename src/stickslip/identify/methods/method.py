@@ -30,53 +30,15 @@ class Options:
     ----------
     laws : tuple of str or Law
         Names, paths of law files, or laws; empty: the method's own candidates.
-    values : mapping of str to float
-        Starting values and known values of parameters, by name, SI units.
-    frozen, free : tuple of str
-        Parameters that keep their value; that are fitted although they usually are not.
-    model : Model or None
-        What an earlier identification found.
-    noise : float or None
-        Standard deviation of what is fitted: N·m, or rad (method `lugre`).
+    values, frozen, free, model, noise, elements, threshold, inverse, per_direction, pendulum, drive_gain, resistance, \
+    loop_output, extra_torque, torque_is, delay, harmonics, position_map, load, intervals, robust
+        As of `stickslip.verbs.identify.identify`, which says what each is, with its unit.
     torque : str
         Channel of the torque; empty: the first known one. Not for the method `axis`.
-    elements : int
-        Of the GMS law (presliding); 0: chosen.
-    threshold : float or None
-        Velocity that counts as motion, rad/s (m/s), of the method `breakaway`.
     held_out : int
         How many of the records, the last ones, are not fitted but judge the result (axis).
-    inverse : bool
-        Linear least squares only, no simulation (axis).
-    per_direction : bool
-        Friction with parameters of its own for each direction (axis, sliding).
-    pendulum : bool
-        Gravity is m g l sin(q - q0), otherwise a constant torque (axis).
-    drive_gain : float or None
-        Torque per unit of the drive's signal.
     torque_constant, force_constant : float or None
         N·m/A of a motor that turns, N/A of a linear one.
-    resistance : float or None
-        Of the motor, ohm, where a voltage drives it.
-    loop_output : {"torque", "current", "voltage"} or None
-        What a simulated loop's output is where no drive signal is recorded.
-    extra_torque : str
-        Channel of a known torque that is added to the recorded one.
-    torque_is : {"commanded", "actual", "mean"} or None
-        What the torque's column holds: the command from this row to the next, the value at the row, or the mean over
-        the row before. Held together with `delay`.
-    delay : float or None
-        s from then until it acts; None: when it acted is found from the record.
-    harmonics : int
-        Of a torque over the position (axis).
-    position_map : bool
-        Whether a map over the angle, orders chosen by the records, is found and taken out first (axis).
-    load : bool
-        Friction that grows with the load of the gearing (axis).
-    intervals : {"prediction", "covariance"}
-        As in `stickslip.identify.axis.identify.identify_axis`.
-    robust : bool
-        Outliers count linearly in the output error (axis).
     regress : callable
         The regression on certain sliding; a `stickslip.identify.regression.regressions.Regressions` does not repeat
         the doctor's.

@@ -28,7 +28,7 @@ from stickslip.identify.regression.band_system import (
 )
 from stickslip.identify.regression.bent import bent_in, explains, swing_explains
 from stickslip.identify.regression.drifting import drift_rows
-from stickslip.identify.regression.flexible import Swing, Train, flexible_columns
+from stickslip.identify.regression.flexible import MAY_GIVE, Swing, Train, flexible_columns
 from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.sliding_rows import Fall, SlidingRows
 from stickslip.identify.regression.strokes import memory_of
@@ -48,10 +48,6 @@ TENSION, FAR = (
 )  # standard deviations: viscous friction below 0 at most; above 0, where the bound does nothing
 MEMORY = 3.0  # rows over which it is correlated at least
 MOVES = 0.35  # of a torque over the position, by which it moves what accelerates where its orders are not told apart
-
-
-GIVES = 2.0 / 3.0
-"""Part of a rigid axis's misfit that a load behind a spring would leave: from there on it may be what is seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +106,9 @@ class BandFit:
     flexible: float
 
     @property
-    def gives(self) -> bool:
-        """Whether the torque bends as that of an axis with a load behind a spring."""
-        return self.swing.acceleration != 0.0 or self.flexible <= GIVES
+    def may_give(self) -> bool:
+        """Whether a load behind a spring may be what bends the torque."""
+        return self.swing.acceleration != 0.0 or self.flexible <= MAY_GIVE
 
 
 def fit_band(

@@ -29,6 +29,8 @@ GIVES, SWINGS = 0.5, 0.8
 """Part of the misfit of a rigid axis that one which gives must leave at most, and one that swings of the least of both.
 Of 198 logs of another program, belts and lags among them, 81 % of the inertias held beside a rigid axis, 95 % beside
 these; on tuning steps, where little else tells them, the more held the less was needed."""
+MAY_GIVE = 2.0 / 3.0
+"""The same that the columns would leave at least, from which on a spring may be what is seen where it is not taken."""
 HARDLY = 0.9
 """Part of the misfit of a rigid axis above which what the columns could leave at least is not worth their fits: of 271
 records none was taken to give or to swing where they leave more than 0.82 so."""
