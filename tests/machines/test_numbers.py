@@ -44,4 +44,4 @@ def test_what_it_has_not_and_what_cannot_be_are_named() -> None:
     with pytest.raises(InputError, match="encoder"):
         with_numbers(one, {"encoder.count": 1.0})
     with pytest.raises(ParameterError, match="delay"):
-        with_numbers(one, {"delay": 2.0})
+        with_numbers(one, {"delay": 200.0})

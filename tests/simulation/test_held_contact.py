@@ -130,20 +130,17 @@ class ByScipy:
 
 def loop_by(plant: Any, samples: int, delay: float) -> np.ndarray[Any, Any]:
     """Angle of the encoder at the samples under the PD controller of `machine_run`."""
-    x, before, old, out = np.zeros(7), 0.0, 0.0, []
-    late = round(delay * 100)
+    x, old, out, told = np.zeros(7), 0.0, [], [0.0] * (math.floor(delay) + 1)
+    late = round(delay * 100) % 100
     for k in range(samples + 1):
         out.append(x[2])
         w = OMEGA * k * PERIOD
         torque = KP * (AMPLITUDE * (1 - math.cos(w)) - x[2]) + KD * AMPLITUDE * OMEGA * math.sin(w)
         torque -= KD * (x[2] - old) / PERIOD if k else 0.0
         old = x[2]
-        x = (
-            plant.over(plant.over(x, before, late), torque, 100 - late)
-            if late
-            else plant.over(x, torque, 100)
-        )
-        before = torque
+        told.append(torque)
+        before, now = told[-math.floor(delay) - 2], told[-math.floor(delay) - 1]
+        x = plant.over(plant.over(x, before, late), now, 100 - late) if late else plant.over(x, now, 100)
     return np.array(out)
 
 
@@ -166,7 +163,7 @@ def test_a_disk_that_never_slips_leaves_a_linear_train() -> None:
 
 
 @pytest.mark.parametrize("bandwidth", [math.inf, 500.0])
-@pytest.mark.parametrize("delay", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("delay", [0.0, 0.5, 1.0, 2.0, 3.25])
 @pytest.mark.parametrize("law", ["coulomb", "static"])
 def test_it_breaks_away_and_stops_where_it_does(law: str, delay: float, bandwidth: float) -> None:
     values = {"fc": 0.3, "sigma2": 0.01} | ({"fs": 0.36} if law == "static" else {})
@@ -176,7 +173,7 @@ def test_it_breaks_away_and_stops_where_it_does(law: str, delay: float, bandwidt
     assert np.max(np.abs(r["position"] - truth)) < 1e-9
 
 
-@pytest.mark.parametrize("delay", [0.0, 1.0])
+@pytest.mark.parametrize("delay", [0.0, 1.0, 2.5])
 def test_the_estimate_of_the_error_holds_for_sub_steps(delay: float) -> None:
     values = {"sigma0": 3e3, "sigma1": 0.3, "fs": 0.36, "fc": 0.3, "vs": 0.01, "sigma2": 0.01}
     r = machine_run(ss.Model("lugre", **values), 150, delay, 500.0, check=True)

@@ -105,6 +105,18 @@ def test_delay_moves_the_torque_by_its_part_of_a_sample():
     assert late[1, 1] == pytest.approx(now[0, 1], rel=1e-12)
 
 
+@pytest.mark.parametrize("whole", [1, 4, 99])
+@pytest.mark.parametrize("part", [0.0, 0.25, 1.0])
+def test_a_longer_delay_moves_the_same_motion_by_whole_samples(whole: int, part: float) -> None:
+    m = replace(machine("ideal"), delay=part)
+    torques = np.random.default_rng(3).uniform(-0.6, 0.6, 50)
+    now = moved(m, torques)[:, 1]
+    late = moved(replace(m, delay=whole + part), np.append(torques, np.zeros(whole)))[:, 1]
+    assert np.ptp(now) > 1e-3
+    assert not late[:whole].any()
+    np.testing.assert_allclose(late[whole:], now, rtol=0.0, atol=1e-12)
+
+
 def test_pause_advances_drift_and_cools():
     m = machine("thesis-dry")
     laid = lay_out_machine(m)

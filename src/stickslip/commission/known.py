@@ -16,7 +16,7 @@ from stickslip.identify.response.nyquist import Fastest
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.contact import Contact, Drift
 from stickslip.machines.encoder import Encoder
-from stickslip.machines.machine import Machine
+from stickslip.machines.machine import LONGEST_DELAY, Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.model import Model
 from stickslip.recommend.candidate_run import Drive
@@ -89,7 +89,7 @@ class Known:
             Contact(self.model, self.angle.ripple, drift=Drift(level - 1.0, SETTLED) if level != 1.0 else Drift()),
             flexible=axis, flexible_stiffness=stiff, amplifier=Amplifier(1.0, rig.limits.torque),
             encoder=Encoder(2.0 * math.pi / self.resolution if self.resolution > 0.0 else 0.0),
-            delay=min(max(self.drivetrain.delay, 0.0), 1.0), sample_time=rig.sample_time,
+            delay=min(max(self.drivetrain.delay, 0.0), LONGEST_DELAY), sample_time=rig.sample_time,
         )  # fmt: skip
 
     def drive(self, rig: Rig, bandwidth: float) -> Drive:

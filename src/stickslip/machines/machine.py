@@ -51,8 +51,8 @@ class Sensor:
 
 
 SILENT = Sensor()
-SHORT_DELAY = 0.01
-"""Samples: a delay below may be meant in s."""
+SHORT_DELAY, LONGEST_DELAY = 0.01, 100.0
+"""Samples: a delay below may be meant in s; more than any drive has, and than `stability` takes."""
 
 
 @constructor_named
@@ -82,7 +82,7 @@ class Machine:
     switched_off : tuple of str
         Imperfections that `without` left out.
     delay : float
-        Part of a sample by which a command acts late, 0 to 1, in samples: 0.2 ms at 1 kHz are 0.2.
+        Samples by which a command acts late, 0 to 100, of which parts count: 0.2 ms at 1 kHz are 0.2.
 
     Warns
     -----
@@ -112,8 +112,8 @@ class Machine:
     delay: Annotated[
         float,
         Par(
-            "samples", "", "part of a sample by which a command acts late, in samples and not in s: s over sample_time",
-            lower=0.0, upper=1.0,
+            "samples", "", "samples by which a command acts late, parts of them too, and not s: s over sample_time",
+            lower=0.0, upper=LONGEST_DELAY,
         ),
     ] = 0.0  # fmt: skip
     filter: Annotated[
@@ -148,10 +148,9 @@ class Machine:
                 f"{self.inertia:g}; make them agree"
             )
         self._has_springs_to_stiffen()
-        if not 0.0 <= self.delay <= 1.0:
+        if not 0.0 <= self.delay <= LONGEST_DELAY:
             raise ParameterError(
-                f"machine: delay = {self.delay:g} must be from 0 to 1, in samples (s over sample_time); a longer "
-                "one is not simulated: `stability` takes any number, or give the machine a longer sample_time"
+                f"machine: delay = {self.delay:g} must be from 0 to {LONGEST_DELAY:g}, in samples (s over sample_time)"
             )
         if not (self.sample_time > 0.0 and math.isfinite(self.sample_time)):
             raise ParameterError(

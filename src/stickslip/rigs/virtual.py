@@ -128,7 +128,7 @@ class VirtualRig:
 
     def close(self) -> None:
         """Nothing to disconnect; torque that was on its way is dropped."""
-        self.laid.now["pending"] = 0.0
+        self.laid.forget_commands()
 
     @property
     def speed(self) -> float:

@@ -28,6 +28,7 @@ from stickslip.simulation.machine.plant import (
     LEVELS,
     MACHINE,
     NOW,
+    QUEUE,
     SLOTS,
     SPRINGS,
     Laid,
@@ -95,10 +96,12 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE, *, located: 
         matrix = transition(machine, system, 0.0 if unresolved else stiff)
     else:
         matrix = np.zeros(1)
-    numbers, memory = np.zeros(1, MACHINE), np.zeros(1, NOW)
-    n, now = numbers[0], memory[0]
+    queued = max(math.ceil(machine.delay) - 1, 0)
+    numbers, memory = np.zeros(1, MACHINE), np.zeros(QUEUE + queued)
+    n, now = numbers[0], memory[:QUEUE].view(NOW)[0]
     write_numbers(n, machine, places, tolerance)
     n["states"], n["stiffness"], n["unresolved"] = states, stiff, unresolved
+    n["queued"], n["delay"] = queued, math.floor(math.ldexp(machine.delay - queued, FINEST) + 0.5)
     n["located"] = train.size > 1
     n["mover"], n["step"], n["holding"] = mover(bool(n["located"]), holds), pointers.step, pointers.holding
     n["resolving"] = min(resolving, UNRESOLVABLE)
@@ -118,7 +121,7 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE, *, located: 
     root.ready(search, 1.0, ROUNDING, LEAST, 1.0)
     contact[:states] = state[:states]
     return Laid(
-        numbers.view(np.float64), memory.view(np.float64), waves_of(machine), matrix, search,
+        numbers.view(np.float64), memory, waves_of(machine), matrix, search,
         np.zeros(2 * SLOTS), contact, parameters, np.array(Surroundings()), train,
     )  # fmt: skip
 
@@ -201,7 +204,7 @@ def write_numbers(n: Any, machine: Machine, places: dict[str, int], tolerance: f
     values = {
         **places, "ripples": len(contact.ripple.order), "cogs": len(machine.cogging.order),
         "coarsest": min(halvings(bearing_parts(machine, finer)), FINEST), "finest": FINEST, "seed": machine.seed,
-        "delay": math.floor(math.ldexp(machine.delay, FINEST) + 0.5), "sample_time": machine.sample_time,
+        "sample_time": machine.sample_time,
         "torque_constant": amplifier.torque_constant, "current_limit": min(amplifier.current_limit, 1e300),
         "command_step": amplifier.command.step, "monitor_step": amplifier.monitor.step,
         "current_noise": amplifier.current_noise, "monitor_noise": amplifier.monitor_noise,

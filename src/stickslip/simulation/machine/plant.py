@@ -37,8 +37,8 @@ MACHINE = np.dtype(
             "finest",
             # The same from which what a step shows tells whether there is an event; terms of a series.
             "watched", "terms",
-            # In shortest sub-steps.
-            "delay", "seed",
+            # Whole samples, and of the next one shortest sub-steps, by which a command acts late.
+            "queued", "delay", "seed",
             # Whether the motion is the located flow of its train; addresses of what moves it over a sample, and of the
             # law's functions, 0 where it has none.
             "located", "mover", "step", "holding",
@@ -80,6 +80,8 @@ they get and still wrong by more than the tolerance; the current on its way, A, 
 contact's temperature, °C, and s of pauses; torques of contact and bearings, N·m, what ripple, drift and warmth make of
 the contact's; of the sub-step that is tried, the contact's torque at its end beside its spring, N·m, and by how much
 that rises with the angle."""
+QUEUE = NOW.itemsize // 8
+"""Where, behind a `NOW`, the commands lie that act whole samples late, A: a ring, whose oldest is due next."""
 
 
 CHANNELS = ("time", "position", "motor_torque", "sensor_torque", "temperature", "status")
@@ -94,7 +96,7 @@ class Laid(NamedTuple):
     Attributes
     ----------
     numbers, memory : array
-        The bytes of a `MACHINE` and a `NOW`.
+        The bytes of a `MACHINE`; of a `NOW`, with the ring of commands behind it (`QUEUE`).
     waves : array, shape (3 n,)
         Order, amplitude and phase of every harmonic: those of the contact's ripple, then of the cogging.
     matrix : array
@@ -132,7 +134,12 @@ class Laid(NamedTuple):
     @property
     def now(self) -> Any:
         """What changes, by name; a view."""
-        return self.memory.view(NOW)[0]
+        return self.memory[:QUEUE].view(NOW)[0]
+
+    def forget_commands(self) -> None:
+        """Drop the commands on their way."""
+        self.now["pending"] = 0.0
+        self.memory[QUEUE:] = 0.0
 
 
 class Plant(NamedTuple):

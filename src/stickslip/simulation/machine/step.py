@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import call_mover, kernel, pointer, record_at
-from stickslip.simulation.machine.plant import FINEST, SHOWN, Plant
+from stickslip.simulation.machine.plant import FINEST, QUEUE, SHOWN, Plant
 from stickslip.simulation.machine.substep import harmonics
 
 OVERSPEED = 33792.0  # 8400h of CiA 402: velocity speed controller
@@ -61,6 +61,8 @@ def sample(plant: Plant, torque: float, measured: Any) -> None:
     tick, x = now.tick, plant.axis
     demand = converted(torque / n.torque_constant, n.command_step)
     demand = min(max(demand, -n.current_limit), n.current_limit)
+    if n.queued > 0:
+        demand = due(pointer(now, QUEUE), tick % n.queued, demand)
     before, now.pending = now.pending, demand
     noise = n.current_noise * gaussian(n.seed, tick, 0) if n.current_noise > 0.0 else 0.0
     on = n.torque_constant if now.tripped == 0 else 0.0
@@ -76,6 +78,14 @@ def sample(plant: Plant, torque: float, measured: Any) -> None:
     now.warmth = warm + (now.warmth - warm) * n.heat_kept
     now.tick = tick + 1
     measure(plant, new if late < 1 << FINEST else old, factor, measured)
+
+
+@kernel(inline=True)
+def due(queue: Any, oldest: int, demand: float) -> float:
+    """The current that was asked for whole samples ago, A; the new one takes its place."""
+    past = queue[oldest]
+    queue[oldest] = demand
+    return past
 
 
 @kernel(inline=True)
