@@ -1,10 +1,10 @@
 """stickslip: friction of servo axes, simulated under control and compensated.
 
 From a log to a compensator: `read`, `doctor`, `identify`, `compare`, `recommend`, `export`. Simulation: `Model`,
-`RigidAxis`, `load_machine`, `Machine` and its parts (`Contact`, `FlexibleAxis`, `Encoder`, ...), `Controller`,
-`Reference`, `simulate`, `respond`, `stability`. Many runs: `study`, `sweep`, `tune`, `learn`. `warm_up` compiles
-everything in advance. Each has its own help, `help(stickslip.identify)`; `identify`, `recommend`, `export`, `study`
-and `sweep` are packages as well, and so stand under PACKAGE CONTENTS rather than FUNCTIONS.
+`RigidAxis`, `load_machine`, `Machine` and its parts (`Contact`, `TwoMassAxis`, `FlexibleAxis`, `Encoder`, ...),
+`Controller`, `Reference`, `simulate`, `respond`, `stability`. Many runs: `study`, `sweep`, `tune`, `learn`. `warm_up`
+compiles everything in advance. Each has its own help, `help(stickslip.identify)`; `identify`, `recommend`, `export`,
+`study` and `sweep` are packages as well, and so stand under PACKAGE CONTENTS rather than FUNCTIONS.
 
 The public names below are loaded when first used, so that importing the package costs nothing.
 """
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from stickslip.machines.machine import Machine, Sensor
     from stickslip.machines.motor import Amplifier, Converter, Harmonics
     from stickslip.machines.rigid import RigidAxis
+    from stickslip.machines.two_mass import TwoMassAxis
     from stickslip.model import Model, Reference
     from stickslip.plugins import law, law_names
     from stickslip.record import Record
@@ -74,6 +75,7 @@ _HOME = {
         "machines.machine": "Machine Sensor",
         "machines.motor": "Amplifier Converter Harmonics",
         "machines.rigid": "RigidAxis",
+        "machines.two_mass": "TwoMassAxis",
         "model": "Model Reference",
         "plugins": "law law_names",
         "record": "Record",
@@ -129,6 +131,7 @@ __all__ = [
     "SimulationError",
     "StickslipError",
     "SweepResult",
+    "TwoMassAxis",
     "allow_code",
     "compare",
     "control_law",

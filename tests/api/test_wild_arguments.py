@@ -113,6 +113,7 @@ def calls() -> dict[str, Call]:
         "Feedback": Call(ss.Feedback, {"model": LAW}),
         "Feedforward": Call(ss.Feedforward, {"model": LAW}),
         "FlexibleAxis": Call(ss.FlexibleAxis, own(ss.FlexibleAxis(1e-4, 1e-4, 1e-4, 1e4, 400.0))),
+        "TwoMassAxis": Call(ss.TwoMassAxis, own(ss.TwoMassAxis(1e-4, 2e-4, 400.0))),
         "Gains": Call(ss.Gains, {"kp": 1.0}),
         "Harmonics": Call(ss.Harmonics, {"order": (1.0,), "amplitude": (0.1,), "phase": (0.0,)}),
         "Heat": Call(ss.Heat, {"coefficient": 0.01}),

@@ -38,8 +38,8 @@ def dry():
 def test_modes_spring_and_masses_are_those_of_the_machine(dry):
     drivetrain, flexible = fit_drivetrain(*dry, DRY.inertia), DRY.flexible
     assert drivetrain.sliding == pytest.approx(flexible.modes[1], rel=0.02)
-    assert drivetrain.axis.elasticity == pytest.approx(flexible.elasticity, rel=0.03)
-    assert drivetrain.axis.disk == pytest.approx(flexible.disk, rel=0.03)
+    assert drivetrain.axis.stiffness == pytest.approx(flexible.elasticity, rel=0.03)
+    assert drivetrain.axis.load == pytest.approx(flexible.disk, rel=0.03)
     assert drivetrain.axis.inertia == pytest.approx(DRY.inertia)
     found = identified_drivetrain(dry, drivetrain, fastest_pd(dry, DRY.inertia).sentence)
     assert found["mode_sticking"].value < found["mode_sliding"].value

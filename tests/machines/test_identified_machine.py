@@ -56,7 +56,7 @@ def test_it_is_shown_printed_and_run(
 ) -> None:
     monkeypatch.chdir(model.parent)
     assert main(["machine", "arm.toml"]) == 0
-    assert "free modes: 0, 22, 3100 Hz" in capsys.readouterr().out
+    assert "free modes: 0, 22 Hz" in capsys.readouterr().out
     assert main(["machine", "arm.toml", "--print"]) == 0
     Path("printed.toml").write_text(capsys.readouterr().out)
     one, other = machine("arm.toml"), machine("printed.toml")

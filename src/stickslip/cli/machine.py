@@ -91,6 +91,8 @@ def lines(machine: Machine) -> Iterator[str]:
         elif name and name in BY_NAME:
             yield f"\n{name}: {BY_NAME[name].title}"
             yield from rows(BY_NAME[name], values)
+            if name == "two_mass":
+                yield f"  {'encoder':19} {values['encoder']:28}  {BY_NAME[name].more['encoder']}"
     yield ""
     if machine.flexible:
         yield f"free modes: {', '.join(f'{mode:.4g}' for mode in machine.flexible.modes)} Hz"

@@ -82,7 +82,7 @@ class Known:
         axis = self.drivetrain.axis
         stiff = 0.0
         if axis:
-            most = STIFFEST * axis.elasticity
+            most = STIFFEST * axis.stiffness
             stiff = min(axis.behind(self.stiffness), most)
         return Machine(
             "identified", self.inertia,

@@ -24,6 +24,8 @@ from stickslip.machines.identified import identified_machine, is_identified
 from stickslip.machines.keys import BY_NAME
 from stickslip.machines.machine import Machine, Sensor
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
+from stickslip.machines.train import Train
+from stickslip.machines.two_mass import ENCODERS, TwoMassAxis
 from stickslip.model import Model
 from stickslip.model_tables import model
 
@@ -89,7 +91,7 @@ def _read(path: Path) -> Machine:
     with content as top, top.blamed():
         friction, notes = _friction(top.table("friction")), _notes(top)
         own = BY_NAME[""].read(top)
-        flexible, stiffness = _flexible(top)
+        flexible, stiffness = _train(top)
         contact = _contact_of(top, friction)
         cogging = _part(top, "cogging")
         made = Machine(
@@ -135,10 +137,19 @@ def _part(top: Table, name: str) -> dict[str, Any]:
         return BY_NAME[name].read(table)
 
 
-def _flexible(top: Table) -> tuple[FlexibleAxis | None, float]:
-    own = _part(top, "flexible")
-    stiffness = own.pop("flexible_stiffness", 0.0)
-    return (FlexibleAxis(**own) if own else None), stiffness
+def _train(top: Table) -> tuple[Train | None, float]:
+    """The inertias and springs of an axis that is not rigid, and the contact's stiffness."""
+    if not top.has("two_mass"):
+        own = _part(top, "flexible")
+        stiffness = own.pop("flexible_stiffness", 0.0)
+        return (FlexibleAxis(**own) if own else None), stiffness
+    if top.has("flexible"):
+        raise top.error("two_mass", "and flexible exclude each other; give one of them")
+    with top.table("two_mass") as table:
+        own = BY_NAME["two_mass"].read(table)
+        stiffness = own.pop("flexible_stiffness")
+        encoder: Any = table.choice("encoder", ENCODERS, ENCODERS[0])
+        return TwoMassAxis(**own, encoder=encoder), stiffness
 
 
 def _contact_of(top: Table, friction: Model) -> Contact:

@@ -20,6 +20,7 @@ from stickslip.machines.encoder import Encoder
 from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.machine import Machine, Sensor
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
+from stickslip.machines.two_mass import TwoMassAxis
 
 
 class Key(NamedTuple):
@@ -163,6 +164,8 @@ LAW = {
     "choices": 'option of a choice by name, such as `curve = "stribeck"`',
 }
 
+AT_CONTACT = keys_of(Machine, ("flexible_stiffness",), named={"flexible_stiffness": "contact_stiffness"})
+
 PARTS: tuple[Part, ...] = (
     Part(
         "", "The machine",
@@ -182,8 +185,14 @@ PARTS: tuple[Part, ...] = (
         "Rotor, shaft and disk with springs between them, instead of a rigid axis; the three add up to the inertia",
         (
             *keys_of(FlexibleAxis, named={"coupling": "coupling_stiffness", "elasticity": "shaft_stiffness"}),
-            *keys_of(Machine, ("flexible_stiffness",), named={"flexible_stiffness": "contact_stiffness"}),
+            *AT_CONTACT,
         ),
+    ),
+    Part(
+        "two_mass",
+        "Motor and load with a spring between them, in place of [flexible]; both add up to the inertia",
+        (*keys_of(TwoMassAxis), *AT_CONTACT),
+        {"encoder": 'whose angle is measured, "motor" or "load" (default "motor")'},
     ),
     Part("bearings", "The bearings' part of the friction", keys_of(Bearings)),
     Part(

@@ -22,8 +22,8 @@ from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.described import described
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
 from stickslip.machines.encoder import Encoder
-from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
+from stickslip.machines.train import Train
 from stickslip.model import Model, level_of_caller
 
 UNITY, NONE, EXACT, EXACTLY = Amplifier(1.0), Harmonics(), Encoder(), Converter()
@@ -64,7 +64,7 @@ class Machine:
     Attributes
     ----------
     name, title : str
-    flexible : FlexibleAxis or None
+    flexible : FlexibleAxis, TwoMassAxis or None
         None: rigid.
     contact : Contact
         Its law holds as seen at the encoder: printed values.
@@ -95,7 +95,7 @@ class Machine:
     inertia: Annotated[float, Par("kg·m²", "J", "inertia of the whole axis", positive=True)]
     contact: Contact
     title: str = ""
-    flexible: FlexibleAxis | None = None
+    flexible: Train | None = None
     flexible_stiffness: Annotated[
         float,
         Par(
@@ -144,7 +144,7 @@ class Machine:
             )
         if self.flexible and abs(self.flexible.inertia / self.inertia - 1.0) > 1e-6:
             raise ParameterError(
-                f"machine: rotor, shaft and disk add up to {self.flexible.inertia:g} kg·m², not to inertia = "
+                f"machine: the inertias of its train add up to {self.flexible.inertia:g} kg·m², not to inertia = "
                 f"{self.inertia:g}; make them agree"
             )
         self._has_springs_to_stiffen()
@@ -277,11 +277,11 @@ class Machine:
         """
         flexible, encoder = self.flexible, self.encoder
         return Drivetrain(
-            (flexible.rotor, flexible.shaft, flexible.disk) if flexible else (self.inertia,),
-            (flexible.coupling, flexible.elasticity) if flexible else (),
+            flexible.inertias if flexible else (self.inertia,),
+            flexible.springs if flexible else (),
             contact,
             flexible.dampers if flexible else (),
-            encoder=1 if flexible else 0,
+            encoder=flexible.encoder_at if flexible else 0,
             encoder_mode=encoder.mode if encoder.mode_share > 0.0 else 0.0,
             encoder_damping=encoder.mode_damping,
             encoder_share=encoder.mode_share,

@@ -1,7 +1,7 @@
 """The numbers of a machine by name, read and changed: ``delay``, ``encoder.noise``, ``amplifier.bandwidth``, ...
 
-What a sweep or a tolerance study varies. The inertia of a flexible machine is shared among rotor, shaft and disk as it
-was; parameters of its friction are those of its law (`Machine.friction`), not named here.
+What a sweep or a tolerance study varies. The inertia of a flexible machine is shared among its masses as it was;
+parameters of its friction are those of its law (`Machine.friction`), not named here.
 """
 
 from __future__ import annotations
@@ -91,8 +91,7 @@ def _with_inertia(machine: Machine, inertia: float) -> Machine:
     if machine.flexible is None:
         return replace(machine, inertia=inertia)
     share = inertia / machine.inertia
-    bodies = {name: share * getattr(machine.flexible, name) for name in ("rotor", "shaft", "disk")}
-    flexible = replace(machine.flexible, **bodies)
+    flexible = machine.flexible.scaled(share)
     return replace(machine, inertia=flexible.inertia, flexible=flexible)
 
 

@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from stickslip.errors import ParameterError
-from stickslip.machines.flexible import FlexibleAxis
+from stickslip.machines.two_mass import TwoMassAxis
 
 USUAL_DAMPING = 0.03
 """Of the spring, part of critical: usual of belts, couplings and gears. A log hardly tells it."""
-RIGID = 3.1e3
-"""Hz at which the motor's shaft swings between rotor and encoder: nothing that a loop at some kHz meets."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ class TwoInertias:
         damping: float = USUAL_DAMPING,
         antiresonance: float | None = None,
         motor_share: float | None = None,
-    ) -> FlexibleAxis:
+    ) -> TwoMassAxis:
         """The axis of this inertia with the encoder at the motor and friction at the load.
 
         Parameters
@@ -87,11 +85,7 @@ class TwoInertias:
         motor = inertia * (self.motor_share if motor_share is None else motor_share)
         load = inertia - motor
         held = 2.0 * math.pi * (self.antiresonance if antiresonance is None else antiresonance)
-        half = 0.5 * motor
-        return FlexibleAxis(
-            half, half, load, coupling=0.5 * half * (2.0 * math.pi * RIGID) ** 2, elasticity=load * held**2,
-            damping=damping,
-        )  # fmt: skip
+        return TwoMassAxis(motor, load, load * held**2, damping)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for a file."""

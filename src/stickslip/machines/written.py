@@ -15,6 +15,7 @@ from stickslip.machines.encoder import Encoder
 from stickslip.machines.keys import PARTS, Part
 from stickslip.machines.machine import Machine, Sensor
 from stickslip.machines.motor import Amplifier
+from stickslip.machines.two_mass import TwoMassAxis
 from stickslip.model_tables import written
 
 ALWAYS = ("sample_time",)
@@ -45,6 +46,8 @@ def tables_of(machine: Machine) -> dict[str, Any]:
             out["direction"] = dict(zip(("positive", "negative"), machine.contact.direction))
         elif part.name in owners:
             out[part.name] = _values(part, *owners[part.name])
+            if isinstance(machine.flexible, TwoMassAxis) and part.name == "two_mass":
+                out["two_mass"]["encoder"] = machine.flexible.encoder
     if machine.limits:
         out["limits"] = dict(machine.limits)
     if machine.models:
@@ -58,7 +61,10 @@ def _owners(machine: Machine) -> dict[str, tuple[object, ...]]:
     usual = Contact(contact.friction)
     out: dict[str, tuple[object, ...]] = {}
     if machine.flexible:
-        out["flexible"] = (machine.flexible, machine)
+        out["two_mass" if isinstance(machine.flexible, TwoMassAxis) else "flexible"] = (
+            machine.flexible,
+            machine,
+        )
     for name in ("bearings", "drift", "heat", "ripple"):
         if getattr(contact, name) != getattr(usual, name):
             out[name] = (getattr(contact, name),)
@@ -131,6 +137,7 @@ LAW = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285
 EXAMPLES: Mapping[str, Any] = {
     "title": '"My machine"', "notes": '["Inertia from the data sheet."]', "inertia": "4e-4", "rotor": "1.2e-4",
     "shaft": "1.2e-4", "disk": "1.6e-4", "coupling_stiffness": "17800.0", "shaft_stiffness": "396.0",
+    "motor": "1.2e-4", "load": "2.8e-4", "stiffness": "400.0", "encoder": '"load"',
     "order": "[12, 24]", "amplitude": "[0.006, 0.002]", "phase": "[0.0, 0.7]", "peak_to_peak": "0.05",
     "positive": "1.0", "negative": "0.96", "change": "-0.04", "coefficient": "-0.002", "torque_constant": "0.22",
     "current_limit": "6.0", "bandwidth": "1000.0", "range": "12.0", "max_speed": "37.7", "torque": "1.0",

@@ -24,9 +24,9 @@ from stickslip.identify.axis.falling import missing_fall
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.monte_carlo import draw_models
-from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.machine import Machine
 from stickslip.machines.two_inertias import TwoInertias
+from stickslip.machines.two_mass import TwoMassAxis
 from stickslip.model import Model
 from stickslip.recommend.plant import Plant
 
@@ -154,7 +154,7 @@ def _late(rng: np.random.Generator) -> dict[str, Any]:
     return {**late, "backward": bool(rng.uniform() < 0.5)}
 
 
-def _swinging(train: TwoInertias | None, inertia: float, rng: np.random.Generator) -> FlexibleAxis | None:
+def _swinging(train: TwoInertias | None, inertia: float, rng: np.random.Generator) -> TwoMassAxis | None:
     """Motor and load of these intervals; none where the record told none."""
     if train is None:
         return None

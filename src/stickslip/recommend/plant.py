@@ -17,10 +17,10 @@ import numpy as np
 
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
-from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.machines.rigid import RigidAxis
+from stickslip.machines.train import Train
 from stickslip.simulation.machine.layout import Laid, lay_out_machine
 from stickslip.simulation.train.layout import seat
 
@@ -42,7 +42,7 @@ class Plant(RigidAxis):
     backward : bool
         Whether the drive's reference velocity is the mean over the sample before, half a sample late, as the velocity
         that it measures; else that of the instant.
-    flexible : FlexibleAxis or None
+    flexible : TwoMassAxis or None
         Motor and load behind a spring; None: a rigid axis.
     machine : Machine or None
         The machine at hand, in place of ``delay``, ``bandwidth`` and ``flexible``.
@@ -53,7 +53,7 @@ class Plant(RigidAxis):
     delay: float = 0.0
     bandwidth: float = math.inf
     backward: bool = False
-    flexible: FlexibleAxis | None = None
+    flexible: Train | None = None
     machine: Machine | None = None
 
     @cached_property
@@ -71,11 +71,7 @@ class Plant(RigidAxis):
             )  # fmt: skip
         known = self.machine.without("bearings", "direction")
         part = self.inertia / known.inertia
-        flexible = known.flexible
-        if flexible is not None:
-            flexible = replace(
-                flexible, rotor=part * flexible.rotor, shaft=part * flexible.shaft, disk=part * flexible.disk
-            )
+        flexible = known.flexible.scaled(part) if known.flexible else None
         return replace(
             known, inertia=self.inertia, flexible=flexible, flexible_stiffness=0.0, models={},
             contact=replace(known.contact, friction=self.friction),

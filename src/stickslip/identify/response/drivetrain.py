@@ -19,7 +19,7 @@ from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identify.fit.filters import cross_spectrum, spectrum
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
-from stickslip.machines.flexible import FlexibleAxis
+from stickslip.machines.two_mass import TwoMassAxis
 from stickslip.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -33,8 +33,6 @@ HIGHEST = 0.45
 COHERENT = 0.5
 PEAK = 2.0
 """Factor over the rigid axis's acceleration that makes a mode."""
-STIFF = 40.0
-"""Coupling of the fitted drivetrain over its shaft: stiff enough that its mode lies beyond the sample rate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +112,8 @@ class FittedDrivetrain:
 
     Attributes
     ----------
-    axis : FlexibleAxis or None
-        Its coupling is stiff: motor and encoder are one inertia here. None: no mode is seen while it slides.
+    axis : TwoMassAxis or None
+        The encoder on the motor; None: no mode is seen while it slides.
     delay : float
         Of the torque beyond hold and the answer one sample later, samples.
     sliding, sticking : float
@@ -125,7 +123,7 @@ class FittedDrivetrain:
         delay. Empty for a rigid axis.
     """
 
-    axis: FlexibleAxis | None
+    axis: TwoMassAxis | None
     delay: float
     sliding: float
     sticking: float
@@ -175,7 +173,7 @@ def fit_drivetrain(sliding: LoopResponse, sticking: LoopResponse, inertia: float
     load = inertia / (1.0 + 1.0 / share)
     motor = inertia - load
     spring = motor * (2.0 * math.pi * held) ** 2
-    axis = FlexibleAxis(0.5 * motor, 0.5 * motor, load, STIFF * spring, spring, min(damping, 0.5))
+    axis = TwoMassAxis(motor, load, spring, min(damping, 0.5))
     free = math.sqrt(spring * (1.0 / motor + 1.0 / load)) / (2.0 * math.pi)
     # A Hann window spreads each line over its neighbours: half of them count as independent.
     level = 2.0 * float(found.fun @ found.fun) / (found.fun.size - 4)
@@ -230,7 +228,7 @@ def identified_drivetrain(
     ]
     if drivetrain.axis:
         share, mode, damping, delay = drivetrain.spread
-        load, motor = drivetrain.axis.disk, drivetrain.axis.inertia - drivetrain.axis.disk
+        motor, load = drivetrain.axis.inertias
         # What a relative change of load over motor does to load, to motor, and so to spring and free mode.
         of_load, of_motor = share * motor / drivetrain.axis.inertia, share * load / drivetrain.axis.inertia
         estimates = [
@@ -238,8 +236,8 @@ def identified_drivetrain(
             within("mode_sliding", "Hz", "f", drivetrain.sliding, math.hypot(mode, 0.5 * of_load) * drivetrain.sliding),
             within("damping", "-", "zeta", drivetrain.axis.damping, damping * drivetrain.axis.damping),
             within("delay", "samples", "d", drivetrain.delay, delay),
-            within("spring", "N·m/rad", "k", drivetrain.axis.elasticity,
-                   math.hypot(2.0 * mode, of_motor) * drivetrain.axis.elasticity),
+            within("spring", "N·m/rad", "k", drivetrain.axis.stiffness,
+                   math.hypot(2.0 * mode, of_motor) * drivetrain.axis.stiffness),
             within("load_inertia", "kg·m²", "J_L", load, of_load * load),
         ]  # fmt: skip
     notes = [f"{said}."]
@@ -288,9 +286,9 @@ def picture_of(responses: Sequence[LoopResponse], drivetrain: FittedDrivetrain) 
     )  # fmt: skip
 
 
-def coordinates(axis: FlexibleAxis, drivetrain: FittedDrivetrain) -> Array:
+def coordinates(axis: TwoMassAxis, drivetrain: FittedDrivetrain) -> Array:
     """A drivetrain as `modelled` takes it."""
     return np.array([
-        math.log(axis.disk / (axis.inertia - axis.disk)), math.log(drivetrain.sticking), math.log(axis.damping),
+        math.log(axis.load / axis.motor), math.log(drivetrain.sticking), math.log(axis.damping),
         drivetrain.delay,
     ])  # fmt: skip

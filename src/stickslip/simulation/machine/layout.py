@@ -128,7 +128,7 @@ def lay_out_machine(machine: Machine, tolerance: float = TOLERANCE, *, located: 
 
 def disk_of(machine: Machine) -> float:
     """The inertia at the contact, kg·m²."""
-    return machine.flexible.disk if machine.flexible else machine.inertia
+    return machine.linear().inertias[-1]
 
 
 def contact_spring(machine: Machine) -> float:
@@ -145,8 +145,9 @@ def contact_spring(machine: Machine) -> float:
 
 def places_in(system: StateSpace, machine: Machine) -> dict[str, int]:
     """Where the states lie, and how many they are."""
+    drivetrain = machine.linear()
     return {
-        "rotor": 0, "shaft": 2 if machine.flexible else 0, "disk": 4 if machine.flexible else 0,
+        "rotor": 0, "shaft": 2 * drivetrain.encoder, "disk": 2 * len(drivetrain.springs),
         "lag": place_of("torque", system), "mode": place_of("mode", system), "size": len(system.states),
     }  # fmt: skip
 
@@ -166,7 +167,7 @@ def viscous_part(machine: Machine) -> float:
 def transition(machine: Machine, system: StateSpace, stiff: float) -> Array:
     """The exact flow of the linear part over every length of a sub-step, with every part of the contact's stiffness
     (N·m/rad): what it makes of the states, and what each input adds."""
-    disk = 4 if machine.flexible else 0
+    disk = 2 * len(machine.linear().springs)
     out = np.zeros((SPRINGS + 1 if stiff > 0.0 else 1, LEVELS, COLUMNS, SLOTS))
     for part in range(out.shape[0]):
         spring = stiff * part / SPRINGS
@@ -238,7 +239,8 @@ def bearing_parts(machine: Machine, finer: float) -> float:
     bearings = machine.contact.bearings
     if bearings.coulomb == 0.0:
         return 1.0
-    shaft = machine.flexible.shaft if machine.flexible else machine.inertia
+    drivetrain = machine.linear()
+    shaft = drivetrain.inertias[drivetrain.encoder]
     return machine.sample_time * math.sqrt(bearings.stiffness / shaft) * finer / BEARING_STEP
 
 

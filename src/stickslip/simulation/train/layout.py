@@ -96,7 +96,7 @@ def plan_of(machine: Machine) -> Plan | str:
         return f"law {law!r} is not made of springs"
     if math.isinf(e.attraction) and not e.constant_curve:
         return f"law {law!r} follows a sliding curve at once"
-    system, turning = sliding(machine, e.viscous), 5 if machine.flexible else 1
+    system, turning = sliding(machine, e.viscous), turning_in(machine)
     pace = paces(system, turning, math.fsum(e.stiffness))
     if len(system.states) > MOST or halvings(max(pace) * machine.sample_time / RESOLVED) > MOST_HALVINGS:
         return "its modes are too many, or too fast for its samples"
@@ -148,10 +148,15 @@ def seat(train: Array, parameters: Array) -> None:
         axis["springs"], axis["parameters"] = train[springs_at:].ctypes.data, parameters.ctypes.data
 
 
+def turning_in(machine: Machine) -> int:
+    """The state that is the velocity at the contact."""
+    return 2 * len(machine.linear().springs) + 1
+
+
 def sliding(machine: Machine, viscous: float) -> StateSpace:
     """The linear part of a machine whose contact slides, with the contact's viscous friction (N·m·s/rad) in it."""
     system = machine.linear().state_space()
-    turning = 5 if machine.flexible else 1
+    turning = turning_in(machine)
     system.a[:, turning] -= viscous * system.b[:, INPUTS.index("load")]
     return system
 
