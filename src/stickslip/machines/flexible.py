@@ -67,7 +67,7 @@ class FlexibleAxis(Train):
         return 1
 
     def scaled(self, factor: float) -> FlexibleAxis:
-        """The same with every inertia so many times as large."""
+        """The same with every inertia times `factor`."""
         return replace(self, rotor=factor * self.rotor, shaft=factor * self.shaft, disk=factor * self.disk)
 
     def twist(self, torque: float) -> tuple[float, float]:

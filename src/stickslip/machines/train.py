@@ -35,7 +35,7 @@ class Train(ABC):
 
     @abstractmethod
     def scaled(self, factor: float) -> Self:
-        """The same with every inertia so many times as large."""
+        """The same with every inertia times `factor`."""
 
     @property
     def inertia(self) -> float:

@@ -79,5 +79,5 @@ class TwoMassAxis(Train):
         return math.sqrt(self.stiffness / self.load) / (2.0 * math.pi)
 
     def scaled(self, factor: float) -> TwoMassAxis:
-        """The same with both inertias so many times as large."""
+        """The same with both inertias times `factor`."""
         return replace(self, motor=factor * self.motor, load=factor * self.load)
