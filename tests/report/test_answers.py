@@ -16,7 +16,7 @@ from stickslip import Model
 from stickslip.finding import Finding
 from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.result import on_untold
-from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.estimate import Estimate, Held, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
@@ -117,6 +117,17 @@ def test_the_curve_marks_the_recorded_speeds() -> None:
     assert marks.x.size == 102
     assert marks.x[0] == pytest.approx(1.0)
     assert marks.x[-1] == pytest.approx(12.0)
+
+
+def test_what_was_given_is_not_called_identified() -> None:
+    found = identified()
+    given = Held("inertia", "kg·m²", "J", found["inertia"].value)
+    beside = dataclasses.replace(
+        found, estimates=tuple(e for e in found.estimates if e.name != "inertia"), held=(given,)
+    )
+    assert answers_of(beside, [log()]).trust == "Yes: every number is identified; given: inertia."
+    for shown, said in ((found, "determine every number"), (beside, "determine every other number")):
+        assert said in rendered(shown, [Source("log.csv", log())], "", {})
 
 
 def test_the_answers_say_friction_error_timing_and_the_next_command() -> None:

@@ -67,6 +67,20 @@ def compiled(folder: Path) -> None:
 
 
 @pytest.mark.slow
+def test_an_inertia_that_is_known_is_shown_as_given(page: Any) -> None:
+    """It stands among the numbers, and the axis can be tried: what is given is known."""
+    drop(page, DEMO)
+    page.wait_for_selector(".view.log .findings")
+    page.locator("summary", has_text="Options").click()
+    page.get_by_label("Inertia, if you know it").fill("4e-4")
+    page.get_by_role("button", name="Identify", exact=True).click()
+    page.wait_for_selector(".verdicts")
+    row = page.locator("tr", has=page.locator("th", has_text=re.compile("^inertia$"))).inner_text()
+    assert row.replace("−", "-").split() == ["inertia", "4e-4", "kg·m²", "given"]
+    assert page.get_by_role("link", name="Try it in the workbench").count() == 1
+
+
+@pytest.mark.slow
 def test_a_reload_in_the_middle_of_an_identification_loses_nothing(page: Any) -> None:
     """The job is still there, its progress too, and its result is shown."""
     drop(page, DEMO)

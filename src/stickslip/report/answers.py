@@ -215,7 +215,8 @@ def trusted(found: Identification, reasons: Sequence[str]) -> str:
         return f"With care: {'; '.join(reasons)}{rest}."
     if bad:
         return f"Yes, as far as identified: {', '.join(good)}{rest}."
-    return "Yes: every number is identified."
+    given = f"; given: {', '.join(h.name for h in found.held)}" if found.held else ""
+    return f"Yes: every number is identified{given}."
 
 
 def doubts(found: Identification, sliding: Sliding | None) -> list[str]:

@@ -135,7 +135,7 @@ def rendered(
             *(shown(e, meanings[e.name]) for e in found.estimates),
             *(known(h, meanings[h.name]) for h in found.held),
         ],
-        missing=one_number_each(found.estimates),
+        missing=one_number_each(found.estimates), given=bool(found.held),
         notes=[n for n in found.notes if n not in answers.told],
         misfit=[
             {"name": k.replace("_", " "), "value": number(float(v)), "unit": found.misfit_unit(k)}

@@ -129,7 +129,7 @@ def identify(request: Request, say: Said) -> dict[str, Any]:
         },
         "findings": [f.as_data() for f in found.findings],
         "pictures": [picture_data(p) for p in found.pictures],
-        "axis": "inertia" in {e.name for e in found.identification.estimates},
+        "axis": "inertia" in {e.name for e in (*found.identification.estimates, *found.identification.held)},
     }  # fmt: skip
     written_whole(item.folder / "result.json", plain(result))
     model = found.identification.model

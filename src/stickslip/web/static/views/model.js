@@ -96,7 +96,7 @@ function verdicts(found) {
     h("div", { class: "verdict" }, h("h2", {}, "What is known"), found.answers.friction.map((t) => h("p", {}, t)),
       known.length ? h("ul", {}, known.map((e) => h("li", {}, `${e.name} = ${number(e.value)} ${e.unit} (${interval(e)})`))) : h("p", {}, "Nothing is identified.")),
     h("div", { class: "verdict" }, h("h2", {}, "What is not"),
-      open.length ? h("ul", {}, open.map((e) => h("li", {}, `${e.name}: ${e.verdict || "the data do not determine it"}`))) : h("p", {}, "Every number is identified.")),
+      open.length ? h("ul", {}, open.map((e) => h("li", {}, `${e.name}: ${e.verdict || "the data do not determine it"}`))) : h("p", {}, found.held?.length ? "Every other number is identified." : "Every number is identified.")),
     h("div", { class: "verdict" }, h("h2", {}, "What to measure next"),
       found.measure_next.length ? h("ul", {}, found.measure_next.map((t) => h("li", {}, t))) : h("p", {}, "Nothing more is needed for this law.")));
 }
@@ -105,9 +105,10 @@ function numbers(found) {
   const row = (e) => h("tr", {}, h("th", { scope: "row" }, e.name), h("td", {}, copyable(number(e.value, 5), e.value, e.name)),
     h("td", {}, e.lower === null || e.upper === null ? "unknown" : copyable(`${number(e.lower, 5)} to ${number(e.upper, 5)}`, `${e.lower} ${e.upper}`, `interval of ${e.name}`)),
     h("td", {}, e.unit), h("td", { class: e.identified ? "good" : "fair" }, e.identified ? "identified" : "not identified"));
+  const given = (e) => h("tr", {}, h("th", { scope: "row" }, e.name), h("td", {}, copyable(number(e.value, 5), e.value, e.name)), h("td", {}), h("td", {}, e.unit), h("td", {}, "given"));
   const misfit = Object.entries(found.misfit).filter(([, v]) => v !== null);
   return h("section", {}, h("h2", {}, "Numbers"),
-    h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Parameters" }, h("table", {}, h("thead", {}, h("tr", {}, ["parameter", "value", "95 % interval", "unit", "verdict"].map((t) => h("th", { scope: "col" }, t)))), h("tbody", {}, found.estimates.map(row)))),
+    h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Parameters" }, h("table", {}, h("thead", {}, h("tr", {}, ["parameter", "value", "95 % interval", "unit", "verdict"].map((t) => h("th", { scope: "col" }, t)))), h("tbody", {}, found.estimates.map(row), (found.held ?? []).map(given)))),
     h("details", {}, h("summary", {}, "How well it fits, in numbers"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Misfit" }, h("table", {}, h("tbody", {}, misfit.map(([k, v]) => h("tr", {}, h("th", { scope: "row" }, k.replaceAll("_", " ")), h("td", {}, copyable(number(v, 5), v, k)))))))));
 }
 
