@@ -86,9 +86,9 @@ def test_the_error_of_a_run_is_told_by_finer_steps() -> None:
     run = ss.simulate(smooth, controller, SINE, 1.0, check=True)
     finest = ss.simulate(smooth, controller, SINE, 1.0, check=False)
     assert finest.meta["counts"]["substeps"] == run.meta["counts"]["substeps"]
-    from stickslip.simulation.machine.loop import simulate_machine
-
-    fine = simulate_machine(smooth, controller, SINE, 1.0, tolerance=1e-12)
+    assert run.meta["tolerance"] == 1e-9
+    fine = ss.simulate(smooth, controller, SINE, 1.0, tolerance=1e-11)
+    assert fine.meta["sub_step_tolerance"] == pytest.approx(1e-12)
     error = float(np.max(np.abs(run["position"] - fine["position"])))
     told = run.meta["accuracy"]["error_rad"]
     assert 0.0 < told < 1e-4

@@ -66,7 +66,9 @@ def loop(m: Machine, helper: ss.Model | None = LUGRE) -> ss.Controller:
 
 
 def run(m: Machine, reference: ss.Reference, duration: float, tolerance: float = 1e-7) -> ss.Record:
-    return machine_loop.simulate_machine(m, loop(m), reference, duration, metered=False, tolerance=tolerance)
+    """The tolerance is that of a sub-step."""
+    whole = tolerance / machine_loop.sub_step_tolerance(m, 1.0)
+    return machine_loop.simulate_machine(m, loop(m), reference, duration, metered=False, tolerance=whole)
 
 
 # ---- tables and flows ---------------------------------------------------------------------------------------------
@@ -189,7 +191,7 @@ def test_a_rigid_machine_moves_as_a_rigid_axis_on_its_own_located_flow(
     reference = ss.Reference("sine", amplitude=amplitude, frequency=frequency)
     axis = ss.RigidAxis(m.inertia, m.friction)
     more = {"metered": False, "tolerance": 1e-11}
-    one = machine_loop.simulate_machine(m, loop(m), reference, 0.5, initial=(start, 0.0), **more)
+    one = ss.simulate(m, loop(m), reference, 0.5, initial=(start, 0.0), **more)
     other, beside = (
         ss.simulate(axis, loop(m), reference, 0.5, initial=(begin, 0.0), output=one.time, **more)
         for begin in (start, start + 1e-9)
@@ -269,8 +271,6 @@ def test_a_loop_that_comes_to_rest_on_sticking_elements_has_an_end(made, name: s
         gains = ss.Gains(kp=rng.uniform(2.0, 12.0), kd=rng.uniform(0.07, 0.14))
         controller = ss.Controller(gains, torque_limit=1.0, sample_time=TIME)
         reference = ss.Reference("step", amplitude=rng.uniform(0.005, 0.12), tau=0.02)
-        record = machine_loop.simulate_machine(
-            made(LAWS[name]), controller, reference, 2.0, metered=False, tolerance=1e-8
-        )
+        record = ss.simulate(made(LAWS[name]), controller, reference, 2.0, metered=False, tolerance=1e-7)
         assert record.meta["ended"] == 2.0
         assert abs(record.channels["velocity"][-1]) < 1e-9

@@ -172,7 +172,7 @@ def test_a_swept_machine_is_checked_by_one_finer_run(run: Path, monkeypatch: pyt
     values = {"machine.encoder.counts": np.array([known(planned)["machine.encoder.counts"]])}
     found = measured(planned, values, metrics, 1)
     sure, _ = checked(planned, values, metrics, found)
-    assert ran == pytest.approx([1e-7, FINER * 1e-7])  # as simulate(check=True) does
+    assert ran == pytest.approx([1e-9, FINER * 1e-9])  # as simulate(check=True) does
     assert sure.metrics[0, 0] == found.metrics[0, 0]
 
 

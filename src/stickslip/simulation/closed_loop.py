@@ -117,7 +117,7 @@ def simulate(
         return machine_loop.simulate_machine(
             axis, controller, reference, duration,
             output=output, slip_rule=slip_rule, initial=initial, metered=metered, check=check,
-            tolerance=machine_loop.sub_step_tolerance(axis, tolerance),
+            tolerance=tolerance,
         )  # fmt: skip
     case = prepare(
         axis, controller, reference, duration,

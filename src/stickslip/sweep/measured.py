@@ -21,7 +21,7 @@ from stickslip.simulation.integrators import (
     integrator_for,
     reason,
 )
-from stickslip.simulation.machine.loop import FINER, simulate_machine, sub_step_tolerance
+from stickslip.simulation.machine.loop import FINER, simulate_machine
 from stickslip.simulation.many import batch
 from stickslip.simulation.metrics import metrics as read_meter
 from stickslip.study.planned_run import PlannedRun
@@ -112,7 +112,7 @@ def _alone(
     try:
         run = varied(planned, values)
         if isinstance(run.axis, Machine):
-            tolerance = sub_step_tolerance(run.axis, run.numerics.tolerance)
+            tolerance = run.numerics.tolerance
             return _on_machine(run, run.axis, metrics, FINER * tolerance if perturbation else tolerance)
         case = laid_out(run)
         ran = _integrated(case, run.numerics.integrator, run.numerics.time_step, perturbation)

@@ -47,6 +47,8 @@ SURE = 1.5
 """Of what two runs lie apart: the finer one has an error too, a tenth to a third of the other's."""
 LEAST = 0.01
 """Of the tolerance: what two runs that agree may still have in common."""
+USUAL = 1e-9
+"""rad, of a run."""
 READ, EXACT = 100.0, 0.1
 """Of a run's tolerance, that a sub-step may be wrong by: where the loop reads counts of an encoder, which are coarser
 by far; and where it reads the position itself. A contact that creeps before it breaks away makes 1e4 of an error."""
@@ -66,7 +68,7 @@ def simulate_machine(
     initial: tuple[float, float] = (0.0, 0.0),
     metered: bool = True,
     check: bool = False,
-    tolerance: float = TOLERANCE,
+    tolerance: float = USUAL,
 ) -> Record:
     """Run a machine; arguments, record and errors as of `stickslip.simulate`.
 
@@ -75,11 +77,12 @@ def simulate_machine(
     output : float or array
         Spacing of the record's rows, s, a whole number of samples; or times of samples.
     check : bool
-        Whether the run is repeated at a thousandth of the tolerance, at most of the usual one (the noise is the same):
-        ``meta["accuracy"]`` then says by how much both differ at most, ``error_rad``, a hundredth of the tolerance at
-        least. Where the shortest sub-steps do not keep that, what sub-steps twice as long change is added.
+        Whether the run is repeated at a thousandth of the sub-steps' tolerance, at most of the usual one (the noise is
+        the same): ``meta["accuracy"]`` then says by how much both differ at most, ``error_rad``, a hundredth of the
+        tolerance at least. Where the shortest sub-steps do not keep that, what sub-steps twice as long change is added.
     tolerance : float
-        Error in position that a sub-step may make by the end of its sample, rad; a located flow's step a tenth of it.
+        Of the run, rad. A sub-step may be wrong by `sub_step_tolerance` of it by the end of its sample, which
+        ``meta["sub_step_tolerance"]`` says; a located flow's step by a tenth of that.
 
     Returns
     -------
@@ -95,17 +98,19 @@ def simulate_machine(
     control, told = sampled_on(controller, machine, slip_rule)
     places = rows_at(output, machine.sample_time, duration)
     asked = (own, control, reference, duration, places, initial)
-    runs = [_run(*asked, tolerance, metered)]
+    local = sub_step_tolerance(machine, tolerance)
+    runs = [_run(*asked, local, metered)]
     substeps = int(runs[0].laid.now["taken"])
     if check and runs[0].code == 0:
-        finer = FINER * min(tolerance, TOLERANCE)
+        finer = FINER * min(local, TOLERANCE)
         runs.append(_run(*asked, finer, False))
         if runs[1].laid.now["short"]:
             runs.append(_run(*asked, finer, False, FINEST - 1))
     meta: dict[str, Any] = {
         "what": "simulation", "version": stickslip.__version__, "integrator": "machine", "slip_rule": slip_rule,
         "slip_rules": slip_rules(friction=own.contact.friction, **told.pop("laws")),
-        "tolerance": tolerance, "duration": duration, "ended": runs[0].ended, "inertia": machine.inertia,
+        "tolerance": tolerance, "sub_step_tolerance": local, "duration": duration,
+        "ended": runs[0].ended, "inertia": machine.inertia,
         "friction": own.contact.friction.as_dict(), "machine": machine.as_dict(), "reference": reference.as_dict(),
         "sample_time": machine.sample_time, "counts": {"samples": runs[0].samples, "substeps": substeps}, **told,
     }  # fmt: skip
@@ -113,7 +118,7 @@ def simulate_machine(
         meta["general_step"] = cannot_locate(own)
     if learned := after(controller, runs[0].state, machine.sample_time):
         meta["learned"] = learned
-    meta |= _results(runs, tolerance, metered)
+    meta |= _results(runs, local, metered)
     columns = np.ascontiguousarray(runs[0].rows.T)
     channels = {name: columns[i] for i, name in enumerate(COLUMNS) if name != "time"}
     record = Record(columns[0], channels, UNITS, meta)
