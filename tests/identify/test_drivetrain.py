@@ -13,7 +13,12 @@ from stickslip.control.linear import place
 from stickslip.errors import InputError
 from stickslip.identify.response.drivetrain import fit_drivetrain, identified_drivetrain, loop_response
 from stickslip.identify.response.nyquist import fastest_pd
+from stickslip.machines.contact import Contact
+from stickslip.machines.encoder import Encoder
 from stickslip.machines.files import machine
+from stickslip.machines.machine import Machine
+from stickslip.machines.two_mass import TwoMassAxis
+from stickslip.model import Model
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.resonance import Resonance
@@ -44,6 +49,24 @@ def test_modes_spring_and_masses_are_those_of_the_machine(dry):
     found = identified_drivetrain(dry, drivetrain, fastest_pd(dry, DRY.inertia).sentence)
     assert found["mode_sticking"].value < found["mode_sliding"].value
     assert found["spring"].lower < flexible.elasticity < found["spring"].upper
+
+
+@pytest.mark.parametrize("late", [0.0, 0.5, 2.0, 3.4])
+@pytest.mark.parametrize("flexible", [True, False])
+def test_the_delay_is_found_whole_samples_of_it_too(late, flexible):
+    """A phase tells parts of a turn alone: with two samples the search ended at -0.7."""
+    friction = Model("lugre", sigma0=8e3, sigma1=0.1, sigma2=0.01, fs=0.4, fc=0.3, vs=0.02)
+    train = TwoMassAxis(5e-4, 3e-4, 900.0, 0.03) if flexible else None
+    plant = Machine(
+        "belt", 8e-4, Contact(friction), flexible=train, delay=late, limits={"torque": 3.0},
+        encoder=Encoder(65536.0 if flexible else 0.0),
+    )  # fmt: skip
+    drivetrain = fit_drivetrain(*responses(plant), plant.inertia)
+    assert drivetrain.delay == pytest.approx(late, abs=0.15)
+    if train and drivetrain.axis:
+        assert drivetrain.axis.stiffness == pytest.approx(train.stiffness, rel=0.1)
+        assert drivetrain.axis.load == pytest.approx(train.load, rel=0.1)
+    assert bool(drivetrain.axis) == flexible
 
 
 def standing(plant, bandwidth):

@@ -31,6 +31,8 @@ LOWEST = 5.0
 HIGHEST = 0.45
 """Part of the sample rate up to which a response is taken."""
 COHERENT = 0.5
+MOST_DELAY = 20.0
+"""Samples that a torque may be late, and be found to be."""
 PEAK = 2.0
 """Factor over the rigid axis's acceleration that makes a mode."""
 
@@ -157,9 +159,14 @@ def fit_drivetrain(sliding: LoopResponse, sticking: LoopResponse, inertia: float
     optimize: Any = importlib.import_module("scipy.optimize")
     # A spring k between J1 and J2: free^2 = k / (4 pi^2) (1/J1 + 1/J2), held^2 = k / (4 pi^2 J1).
     begin = np.array(
-        [math.log(1.0 / max(1e-3, (free / held) ** 2 - 1.0)), math.log(held), math.log(0.03), 0.1]
+        [math.log(1.0 / max(1e-3, (free / held) ** 2 - 1.0)), math.log(held), math.log(0.03), 0.0]
     )
     bands = [near(sliding, free), near(sticking, held)]
+    ahead, turns = list[Array](), list[Array]()
+    for r, rows in zip((sliding, sticking), bands, strict=True):
+        ahead.append(np.angle((r.response / modelled(begin, r, inertia, r is sticking))[rows]))
+        turns.append(turn_of(r)[rows])
+    begin[3] = delay_told(np.concatenate(ahead), np.concatenate(turns))
 
     def residuals(x: Array) -> Array:
         parts: list[Array] = []
@@ -189,11 +196,27 @@ def over_rigid(r: LoopResponse, inertia: float) -> float:
 
 def rigid_delay(r: LoopResponse, inertia: float) -> float:
     """Delay of a rigid axis's torque, samples, from the phase that the hold leaves."""
-    turn = 2.0 * math.pi * r.frequency * r.sample_time
+    turn = turn_of(r)
     hold = (1.0 - np.exp(-1j * turn)) / (1j * turn)
     rest: Complex = -r.response * inertia * (2.0 * math.pi * r.frequency) ** 2 / hold
-    angle: Array = np.angle(rest)
-    return float(-np.sum(angle * turn) / np.sum(turn**2))
+    return delay_told(np.angle(rest), turn)
+
+
+def turn_of(r: LoopResponse) -> Array:
+    """What a sample is of each frequency, rad."""
+    return 2.0 * math.pi * r.frequency * r.sample_time
+
+
+def delay_told(ahead: Array, turn: Array) -> float:
+    """The delay, samples, that leaves least of a phase by which a response is ahead of a model without it.
+
+    A phase says nothing of whole turns, which a bus's delay of some samples makes: tried are delays first.
+    """
+    tried = np.arange(-1.0, MOST_DELAY, 0.05)
+    off = (1.0 - np.cos(ahead + np.multiply.outer(tried, turn))).sum(axis=1)
+    delay = float(tried[np.argmin(off)])
+    rest = np.angle(np.exp(1j * (ahead + delay * turn)))
+    return delay - float(np.sum(rest * turn) / np.sum(turn**2))
 
 
 def near(r: LoopResponse, peak: float) -> Rows:
@@ -213,7 +236,7 @@ def modelled(x: Array, r: LoopResponse, inertia: float, stuck: bool) -> Complex:
         if stuck
         else Drivetrain((motor, load), (spring,), dampers=(rub,))
     )
-    turn = 2j * math.pi * r.frequency * r.sample_time
+    turn = 1j * turn_of(r)
     hold = (1.0 - np.exp(-turn)) / turn
     return plant.state_space().response(r.frequency) * hold * np.exp(-turn * x[3])
 
