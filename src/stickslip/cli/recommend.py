@@ -75,6 +75,10 @@ def drive_arguments(parser: argparse.ArgumentParser) -> None:
         "record, or 0.001 where the loop would be hardly damped at those; a --controller file may set it)",
     )
     parser.add_argument(
+        "--delay", type=float, metavar="SAMPLES",
+        help="how late a command acts, in samples (default: up to one, drawn; a --machine has its own)",
+    )  # fmt: skip
+    parser.add_argument(
         "--counts-per-rev",
         type=float,
         metavar="N",
@@ -161,8 +165,8 @@ def run(args: argparse.Namespace) -> int:
     with _output.progress_bar("simulating") as progress:
         result = recommend(
             args.model, bandwidth=args.bandwidth, damping=args.damping, linear=args.linear, loop=args.loop,
-            controller=args.controller, machine=args.machine,
-            sample_time=args.sample_time, counts_per_rev=args.counts_per_rev, torque_limit=args.torque_limit,
+            controller=args.controller, machine=args.machine, sample_time=args.sample_time, delay=args.delay,
+            counts_per_rev=args.counts_per_rev, torque_limit=args.torque_limit,
             motion=args.motion, motion_map=args.motion_map, remember=True, amplitude=args.amplitude,
             frequency=args.frequency, inertia=args.inertia, feed_inertia=args.feed_inertia,
             compensators=[n.strip() for n in args.compensators.split(",")] if args.compensators else (),

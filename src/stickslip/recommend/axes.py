@@ -70,6 +70,7 @@ def plants_of(
     start: float = 0.0,
     given: bool = False,
     machine: Machine | None = None,
+    delay: float | None = None,
 ) -> Iterator[Plant]:
     """The best estimate, and `count` axes drawn; about another inertia as wide in proportion.
 
@@ -87,6 +88,8 @@ def plants_of(
     machine : Machine, optional
         The machine at hand: its delay, current loop, springs and torques over the position are not drawn then, but the
         angle at which the motion begins, and the noise.
+    delay : float, optional
+        By which the drive's commands act late, samples; drawn, up to one, where neither this nor a machine says it.
     """
     known = {name: float(found.axis.get(name, 0.0) or 0.0) for name in ("offset", "gravity", "gravity_angle")}
     yield Plant(
@@ -97,6 +100,7 @@ def plants_of(
         backward=True,
         flexible=found.train.axis(inertia) if found.train else None,
         machine=machine,
+        delay=delay or 0.0,
     )
     told = next((e for e in found.estimates if e.name == "inertia"), None)
     identified = told.value if told else inertia
@@ -118,7 +122,7 @@ def plants_of(
                 *(() if told_of(machine) else _unmodelled(misfit * float(rng.uniform()), found.motion, rng)),
             ),
             flexible=_swinging(found.train, own, swings),
-            **(_late(rng) if machine is None else _turned(machine, rng)),
+            **(_late(rng, delay) if machine is None else _turned(machine, rng)),
         )  # fmt: skip
 
 
@@ -147,10 +151,12 @@ def _between(rng: np.random.Generator, low: float, high: float) -> float:
     return math.exp(float(rng.uniform(math.log(low), math.log(high))))
 
 
-def _late(rng: np.random.Generator) -> dict[str, Any]:
-    """Delay and current loop of a drive; of some, none."""
+def _late(rng: np.random.Generator, known: float | None) -> dict[str, Any]:
+    """Delay (samples; that which is known) and current loop of a drive; of some, none."""
     prompt, delay, bandwidth = float(rng.uniform()), float(rng.uniform()), _between(rng, *CURRENT_LOOP)
     late = {} if prompt < PROMPT else {"delay": delay, "bandwidth": bandwidth}
+    if known is not None:
+        late["delay"] = known
     return {**late, "backward": bool(rng.uniform() < 0.5)}
 
 

@@ -209,9 +209,8 @@ def feeds_friction(made: Controller) -> bool:
 def refused(name: str, made: Controller, belief: Belief, drive: Drive) -> str:
     """Why it is not even run, or ""."""
     if name == "lugre-observer":
-        delay = math.ceil(drive.machine.delay) if drive.machine else 0
-        stiffness = belief.number("sigma0")
-        said = objection(made, belief.inertia, stiffness, drive.encoder_counts, delay=delay)
+        stiffness, late = belief.number("sigma0"), math.ceil(drive.latest)
+        said = objection(made, belief.inertia, stiffness, drive.encoder_counts, delay=late)
         if said:
             return said
     if CATALOGUE[name].against:

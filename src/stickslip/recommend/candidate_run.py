@@ -17,7 +17,7 @@ from stickslip.control.learned import after
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import ParameterError
 from stickslip.identify.motion import HOLD, Motion, sinusoid
-from stickslip.machines.machine import Machine
+from stickslip.machines.machine import LONGEST_DELAY, Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.recommend.course import Course, course_of
 from stickslip.recommend.following import followed, simulated
@@ -86,6 +86,8 @@ class Drive:
         used then, and its sample time is the drive's.
     machine : Machine or None
         The machine at hand, with its resonances, encoder, amplifier and delay; None: rigid axes.
+    delay : float or None
+        By which its commands act late, samples, where no machine says it; None: drawn, up to one sample.
     """
 
     bandwidth: float = 10.0
@@ -102,6 +104,7 @@ class Drive:
     controller: Controller | None = None
     machine: Machine | None = None
     sample_time_from: str = ""
+    delay: float | None = None
 
     def __post_init__(self) -> None:
         insist_on_own(self, "drive")
@@ -125,6 +128,8 @@ class Drive:
                     f"drive: {name} = {getattr(self, name):g} Hz is more than a tenth of the sample rate "
                     f"{1.0 / self.sample_time:g} Hz; take a lower one, or a shorter sample time"
                 )
+        if self.delay is not None:
+            self._refuse_delay(self.delay)
         if self.machine is not None:
             refuse_other(self.machine, self.sample_time, self.encoder_counts)
         if self.controller is not None:
@@ -134,6 +139,22 @@ class Drive:
                 f"drive: bandwidth = {self.bandwidth:g} Hz is less than {SLOWEST:g} of the motion's "
                 f"{self.frequency:g} Hz, which the loop would not follow at all; give a higher one"
             )
+
+    def _refuse_delay(self, delay: float) -> None:
+        if self.machine is not None:
+            raise ParameterError(
+                f"drive: delay = {delay:g}, and the machine {self.machine.name} has its own ({self.machine.delay:g} "
+                "samples); give one of them"
+            )
+        if not 0.0 <= delay <= LONGEST_DELAY:
+            raise ParameterError(
+                f"drive: delay = {delay:g} must be from 0 to {LONGEST_DELAY:g}, in samples (s over the sample time)"
+            )
+
+    @property
+    def latest(self) -> float:
+        """Samples by which its commands act late, as far as it is known; 0 where it is not."""
+        return self.machine.delay if self.machine is not None else self.delay or 0.0
 
     @property
     def steps(self) -> float:

@@ -105,6 +105,7 @@ def notes_on(
     candidates: Sequence[Candidate],
     weak: str = "",
     machine: Machine | None = None,
+    delay: float | None = None,
 ) -> Iterator[str]:
     """What the user must know."""
     if weak:
@@ -129,7 +130,7 @@ def notes_on(
             f"A constant torque of {offset} acts in addition to friction: it is part of what is recommended, "
             "simulated and exported."
         )
-    yield _simulated(machine, found.train)
+    yield _simulated(machine, found.train, delay)
 
 
 def _intervals(found: Identified, unknown: Sequence[str]) -> Iterator[str]:
@@ -210,7 +211,7 @@ def better_than_simulated(machine: Machine | None, train: TwoInertias | None) ->
     return BETTER if train is None or machine is not None else BETTER_AT_MOTOR
 
 
-def _simulated(machine: Machine | None, train: TwoInertias | None) -> str:
+def _simulated(machine: Machine | None, train: TwoInertias | None, delay: float | None) -> str:
     """What was simulated, what was not, and how the interval allows for that."""
     axis, beside = "a rigid axis", "resonances"
     if train is not None:
@@ -219,8 +220,9 @@ def _simulated(machine: Machine | None, train: TwoInertias | None) -> str:
             "load)"
         )
         beside = "further resonances"
+    late = "up to a sample" if delay is None else f"{delay:g} samples"
     simulated = (
-        f"Simulated with {axis}, a current loop, up to a sample of delay, friction that comes late as "
+        f"Simulated with {axis}, a current loop, {late} of delay, friction that comes late as "
         f"behind an elastic drivetrain, and position-dependent torques as large as the model's misfit; {beside}, "
         "backlash and noise in the current are not in it (in place of noise a feedback is pushed at rest): for them"
     )

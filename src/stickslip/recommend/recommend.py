@@ -29,6 +29,7 @@ from stickslip.recommend.candidates import (
     on_both,
     rings_alone,
 )
+from stickslip.recommend.late import hardly_damped_where_late, refuse_late
 from stickslip.recommend.long_rest import hunts_alone, hunts_with, long_rests, unsure_at_rest
 from stickslip.recommend.motion_notes import by_reference_velocity, on_motion
 from stickslip.recommend.notes import (
@@ -101,6 +102,7 @@ def recommend(
     drive = with_motion(found, drive)
     refuse_unknown(found)
     refuse_weak(found, drive)
+    refuse_late(found, drive, j)
     linear = drive.loop(j)
     if not found.law_estimates[0]:
         axes = confirm = 0  # Nothing of the friction would be drawn.
@@ -133,9 +135,11 @@ def recommend(
     account.end()
     notes = [
         *sampled_as(drive, chosen), *on_motion(drive, found.unit("rad")), *axes_left_out(bench, others, found),
-        *lag_of(bench.plants[0], first, linear, drive), *by_reference_velocity(chosen, others.plants),
+        *hardly_damped_where_late(found, drive, j), *lag_of(bench.plants[0], first, linear, drive),
+        *by_reference_velocity(chosen, others.plants),
         *notes_on(
             found, chosen, choice.candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine,
+            drive.delay,
         ),
         *beyond_inertia(chosen, choice.friction, choice.candidates), *(() if rung else unsure_at_rest(found, linear)),
         *(doubted_inertia(found, choice.candidates) if chosen is None and inertia is None else ()),
@@ -211,7 +215,7 @@ def drawn(found: Identified, inertia: float | None, count: int, seed: int, empty
     own = drive.given  # Only of a loop that somebody runs is it known that it holds the axis.
     plants = plants_of(
         found, inertia_of(found, inertia), (TRIES if own else 1) * count, seed, float(drive.course.whole.position[0]),
-        inertia is not None, drive.machine,
+        inertia is not None, drive.machine, drive.delay,
     )  # fmt: skip
     return (
         Bench.held(plants, count, linear, drive, laws, ran) if own else Bench(list(plants), linear, drive, laws, ran)

@@ -51,6 +51,7 @@ def recommend(
     controller: Controller | str | os.PathLike[str] | None = None,
     machine: Machine | str | os.PathLike[str] | None = None,
     sample_time: float | None = None,
+    delay: float | None = None,
     counts_per_rev: float | None = None,
     torque_limit: float = math.inf,
     motion: Log | None = None,
@@ -95,6 +96,9 @@ def recommend(
         Of the drive, s; the machine's, else the time between the rows of the identified record, or 1e-3 where the model
         does not tell it, or the loop would be hardly damped at those rows. A note says which. Refused beside a
         `controller` that has its own.
+    delay : float, optional
+        Samples by which a command acts late, as on a bus of two or three cycles; drawn, up to one sample, unless given.
+        A `machine` has its own.
     counts_per_rev : float, optional
         Of the encoder; 0: exact. The machine's, or 0. Of a linear axis the counts in 2π m: 2π over the scale's step
         in m, 12.57e6 for 0.5 µm.
@@ -179,6 +183,8 @@ def recommend(
     if at_hand is not None:
         most = at_hand.limits.get("torque", math.inf)
         drive = replace(drive, machine=at_hand, torque_limit=min(drive.torque_limit, most))
+    if delay is not None:
+        drive = replace(drive, delay=delay)
     besides = made_for(tried, drive, inertia or found.axis.get("inertia"), found.model)
     with allow_code(bool(found.law_file)):  # its model has been read: whoever must approve it has
         try:

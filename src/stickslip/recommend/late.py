@@ -1,0 +1,91 @@
+"""A loop that is too fast for a drive whose commands act late: friction holds it up to where a push is larger.
+
+Such a loop is unstable where the axis slides. Friction takes the energy out of small swings, so that a simulation along
+a slow motion may show none of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from stickslip.analyse.controller_loop import linearised
+from stickslip.analyse.presliding_loop import Loop
+from stickslip.control.controller import Controller
+from stickslip.errors import InputError
+from stickslip.identify.identified_file import Identified
+from stickslip.recommend.candidate_run import Drive
+from stickslip.recommend.plant import Plant
+from stickslip.recommend.sample_time import MIDDLE, WELL_DAMPED
+
+SLOWER = 0.9
+"""Bandwidths that are tried, each over the one before."""
+SLOWEST = 1e-3
+"""Part of the bandwidth, below which none is named."""
+
+
+def sensitivity_of(found: Identified, drive: Drive, inertia: float, loop: Controller) -> float:
+    """Greatest sensitivity of the loop while the axis (inertia in kg·m²) slides; infinite where it is unstable, not a
+    number where the controller is not smooth."""
+    plant = Plant(inertia, found.model, machine=drive.machine).built(drive.sample_time, drive.encoder_counts)
+    try:
+        linear = linearised(loop, math.inf, MIDDLE, drive.latest)
+    except InputError:
+        return math.nan
+    return Loop(plant.linear(), linear).sensitivity()
+
+
+def fastest(found: Identified, drive: Drive, inertia: float) -> float:
+    """The bandwidth below the drive's at which its loop is well damped, Hz; 0 where none is."""
+    bandwidth = drive.bandwidth
+    while (bandwidth := SLOWER * bandwidth) > SLOWEST * drive.bandwidth:
+        slower = place_at(drive, bandwidth, inertia)
+        if sensitivity_of(found, drive, inertia, slower) <= WELL_DAMPED:
+            return bandwidth
+    return 0.0
+
+
+def place_at(drive: Drive, bandwidth: float, inertia: float) -> Controller:
+    """The drive's loop placed at another bandwidth, Hz."""
+    return replace(drive, bandwidth=bandwidth).loop(inertia)
+
+
+def refuse_late(found: Identified, drive: Drive, inertia: float) -> None:
+    """Refuse a loop that is unstable while the axis slides, for how late the drive is.
+
+    Raises
+    ------
+    InputError
+    """
+    if drive.latest == 0.0 or sensitivity_of(found, drive, inertia, drive.loop(inertia)) != math.inf:
+        return
+    late = f"as commands act {drive.latest:g} samples ({1e3 * drive.latest * drive.sample_time:.3g} ms) late"
+    if drive.given:
+        raise InputError(
+            f"this loop is unstable while the axis slides, {late}; check the delay, which is in samples and not in s, "
+            "and the gains"
+        )
+    best = fastest(found, drive, inertia)
+    remedy = (
+        f"give --bandwidth {best:.2g} or less"
+        if best
+        else "no lower bandwidth is well damped on this machine"
+    )
+    raise InputError(
+        f"a loop of {drive.bandwidth:g} Hz is unstable while the axis slides, {late}, and friction alone keeps it calm "
+        f"at rest; {remedy}"
+    )
+
+
+def hardly_damped_where_late(found: Identified, drive: Drive, inertia: float) -> Iterator[str]:
+    """That a placed loop is hardly damped for how late the drive is, and which one would be well damped."""
+    if drive.latest == 0.0 or drive.given:
+        return
+    peak = sensitivity_of(found, drive, inertia, drive.loop(inertia))
+    if peak > WELL_DAMPED and (best := fastest(found, drive, inertia)):
+        yield (
+            f"With commands {drive.latest:g} samples late this loop is hardly damped while the axis slides (greatest "
+            f"sensitivity {peak:.2g}, where {WELL_DAMPED:g} at most is usual): {best:.2g} Hz would be well damped "
+            "(--bandwidth)."
+        )
