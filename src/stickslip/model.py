@@ -105,7 +105,7 @@ class Model:
             )
         name = table.text("law")
         if name.endswith(".py"):
-            name = str(table.document.folder / name)
+            name = str(table.document.locate(name))
         law = plugins.law(name, table.label("law"))
         choices = dict(table.table("choices").values) if table.has("choices") else dict[str, Any]()
         with table.blamed():

@@ -66,7 +66,7 @@ def model(table: Table, laws: Mapping[str, Law], base: Model | None = None) -> M
     with table.blamed():
         if isinstance(table.values.get("law"), dict):
             with table.table("law") as file:
-                base = Model.from_file(file.document.locate(file.text("model")))
+                base = _modelled(file)
         law = base.law if base else _law(table, laws)
         options = {c.name for c in law.choices}
         given = table.rest()
@@ -85,6 +85,13 @@ def model(table: Table, laws: Mapping[str, Law], base: Model | None = None) -> M
         found = found.scaled(**scale) if scale else found
         # A model that a file holds has been remarked upon as it was read.
         return found if base and found.parameters == base.parameters else found.warn(table.label())
+
+
+def _modelled(table: Table) -> Model:
+    """What ``model`` names: a model's file, or a table with the content of one."""
+    if isinstance(table.values.get("model"), dict):
+        return Model.from_table(table.table("model"))
+    return Model.from_file(table.document.locate(table.text("model")))
 
 
 def refuse_unknown(

@@ -48,7 +48,8 @@ def machine(name: str | os.PathLike[str]) -> Machine:
     UnknownName, ConfigError
         If there is none; a key or value that cannot be used, by name.
     """
-    return _read(file_of(name))
+    path = file_of(name)
+    return machine_in(read_toml(path), path.stem)
 
 
 def file_of(name: str | os.PathLike[str]) -> Path:
@@ -84,10 +85,16 @@ def load_machine(name: str | os.PathLike[str]) -> Machine:
     return machine(name)
 
 
-def _read(path: Path) -> Machine:
-    content = read_toml(path)
+def machine_in(content: Table, name: str) -> Machine:
+    """The machine of that name whose file has this content.
+
+    Raises
+    ------
+    ConfigError
+        A key or value that cannot be used, by name.
+    """
     if is_identified(content):
-        return identified_machine(content, path.stem)
+        return identified_machine(content, name)
     with content as top, top.blamed():
         friction, notes = _friction(top.table("friction")), _notes(top)
         own = BY_NAME[""].read(top)
@@ -95,7 +102,7 @@ def _read(path: Path) -> Machine:
         contact = _contact_of(top, friction)
         cogging = _part(top, "cogging")
         made = Machine(
-            path.stem, contact=contact, title=top.text("title", ""), flexible=flexible, flexible_stiffness=stiffness,
+            name, contact=contact, title=top.text("title", ""), flexible=flexible, flexible_stiffness=stiffness,
             amplifier=_amplifier_of(top), cogging=Harmonics(**cogging) if cogging else Harmonics(),
             encoder=Encoder(**_part(top, "encoder")), sensor=_sensor(top), limits=_limits(top), models=_models(top),
             notes=notes, **own,

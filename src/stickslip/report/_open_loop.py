@@ -19,7 +19,8 @@ from stickslip.report.plots import Array, Curve, Panel, draw, envelope, one_pref
 from stickslip.report.styles import Style, style_of, styles_of
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.prescribed.open_loop import respond
-from stickslip.study.plan import Drive, Response, Study, load
+from stickslip.study.open_loop import Drive, Response
+from stickslip.study.plan import Study, load
 from stickslip.study.result import StudyResult
 
 NEAR_ZERO = 0.04  # rad/s, what the thesis shows where it compares laws

@@ -15,7 +15,7 @@ from stickslip.control.files import Placement, composed, placement
 from stickslip.control.registry import law_files
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import InputError
-from stickslip.machines.files import machine
+from stickslip.machines.files import machine, machine_in
 from stickslip.machines.machine import IMPERFECTIONS, Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
@@ -87,11 +87,10 @@ def sample_time_of(axis: RigidAxis | Machine) -> float:
 
 
 def machine_of(table: Table) -> dict[str, Machine]:
-    """The machines of a table by what to append to its name: ``machine`` (a name of the library or a file) with all its
-    imperfections; less those of ``without``, with those of ``only`` alone, or one for each of ``each_alone``, alone."""
+    """The machines of a table by what to append to its name: the whole one, with all its imperfections; less those of
+    ``without``, with those of ``only`` alone, or one for each of ``each_alone``, alone."""
     with table, table.blamed():
-        name = table.text("machine")
-        found = machine(str(table.document.locate(name)) if name.endswith(".toml") else name)
+        found = _whole_machine(table)
         ways = [key for key in ("without", "only", "each_alone") if table.has(key)]
         if len(ways) > 1:
             raise table.error(ways[1], f"and {ways[0]} exclude each other; give one of them")
@@ -106,6 +105,14 @@ def machine_of(table: Table) -> dict[str, Machine]:
         if ways[0] == "only":
             return {"": found.without(*(n for n in IMPERFECTIONS if n not in named))}
         return {f"-{n}": found.without(*(other for other in IMPERFECTIONS if other != n)) for n in named}
+
+
+def _whole_machine(table: Table) -> Machine:
+    """What ``machine`` is: a name of the library, a file, or a table with the content of one."""
+    if isinstance(table.values.get("machine"), dict):
+        return machine_in(table.table("machine"), table.path[-1])
+    name = table.text("machine")
+    return machine(str(table.document.locate(name)) if name.endswith(".toml") else name)
 
 
 def machines(tables: Mapping[str, Table]) -> dict[str, Machine]:

@@ -17,6 +17,7 @@ from stickslip.model import Model, Reference
 from stickslip.study import build
 from stickslip.study.build import Numerics, Placement
 from stickslip.study.known_laws import Design, KnownLaws, laws_in
+from stickslip.study.open_loop import Drive, Response
 from stickslip.study.planned_run import FAMILIES, OWN, PlannedRun
 from stickslip.study.result import Run
 
@@ -24,33 +25,6 @@ SLIP_RULES = ("signed", "literal")
 BUILT_IN = ("thesis", "imperfections", "thesis-rig")
 BENCH = "compensators"
 """The bench that ships beside them (`stickslip.study.bench`)"""
-
-
-@dataclass(frozen=True)
-class Response:
-    """Friction over velocity in open loop: laws that answer to the velocity of a reference."""
-
-    name: str
-    title: str
-    figure: str
-    motion: Reference
-    duration: float
-    models: Mapping[str, Model]
-
-
-@dataclass(frozen=True)
-class Drive:
-    """Positions in open loop: axes with different frictions under the same sinusoidal motor torque."""
-
-    name: str
-    title: str
-    figure: str
-    amplitude: float
-    """N·m"""
-    frequency: float
-    """Hz"""
-    duration: float
-    axes: Mapping[str, RigidAxis]
 
 
 @dataclass(frozen=True)
@@ -85,7 +59,10 @@ class Study:
 
 
 def load(
-    study: str | Path, moved: Mapping[str, Path] | None = None, given: Mapping[str, Any] | None = None
+    study: str | Path,
+    moved: Mapping[str, Path] | None = None,
+    given: Mapping[str, Any] | None = None,
+    shown: str = "",
 ) -> Study:
     """Read a study: the path of a TOML file, or the name of one that ships with the package.
 
@@ -96,6 +73,8 @@ def load(
         Where files that the study refers to lie now, by the path as written.
     given : mapping of str to number or bool, optional
         ``seeds`` and ``ablation`` of a study of experiments, instead of its file's.
+    shown : str
+        How messages call the file; its path unless given.
 
     Raises
     ------
@@ -105,7 +84,7 @@ def load(
     name = str(study)
     if name in BUILT_IN:
         table = read_toml(Path(__file__).with_name(f"{name}.toml"), f"{name}.toml", moved)
-        return _study(name, Path(__file__).with_name(f"{name}.toml"), _with(given, table))
+        return study_in(name, Path(__file__).with_name(f"{name}.toml"), _with(given, table))
     path = Path(study)
     if path.suffix != ".toml" and not path.exists():
         known = (*BUILT_IN, BENCH)
@@ -113,7 +92,7 @@ def load(
             f"unknown study {name!r}; "
             + suggestion(name, known, f"give the path of a TOML file, or one of {', '.join(known)}")
         )
-    return _study(path.stem, path, _with(given, read_toml(path, moved=moved)))
+    return study_in(path.stem, path, _with(given, read_toml(path, shown, moved)))
 
 
 def _with(given: Mapping[str, Any] | None, table: Table) -> Table:
@@ -125,7 +104,13 @@ def _with(given: Mapping[str, Any] | None, table: Table) -> Table:
     return Table({**table.values, **(given or {})}, table.document)
 
 
-def _study(name: str, path: Path, table: Table) -> Study:
+def study_in(name: str, path: Path, table: Table) -> Study:
+    """The study of a table that stands in the file at `path`.
+
+    Raises
+    ------
+    ConfigError
+    """
     with table:
         title = table.text("title", name)
         if table.has("experiments"):

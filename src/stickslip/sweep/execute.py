@@ -351,7 +351,7 @@ def write_manifest(
     folder: Path, sweep: Sweep, timings: Mapping[str, Any], integrators: Sequence[tuple[str, str]]
 ) -> dict[str, Any]:
     """Write the manifest of a sweep."""
-    files = [(sweep.source.name, sweep.source), (sweep.study.source.name, sweep.study.source)]
+    files = [(source.name, source) for source in dict.fromkeys((sweep.source, sweep.study.source))]
     content: dict[str, Any] = {
         "configuration": sweep.config,
         "cases": sweep.drawn.cases,

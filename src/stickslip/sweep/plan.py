@@ -14,7 +14,7 @@ import numpy as np
 from stickslip.config import Table, read_toml
 from stickslip.errors import ConfigError, suggestion
 from stickslip.identify.estimate import Estimate
-from stickslip.identify.identified_file import read_identified
+from stickslip.identify.identified_file import Identified, identified_in, read_identified
 from stickslip.simulation.many import simd_batch
 from stickslip.simulation.metrics import METRICS
 from stickslip.study import plan as studies
@@ -144,7 +144,7 @@ class Sweep:
         return out
 
 
-def load(sweep: str | Path, moved: Mapping[str, Path] | None = None) -> Sweep:
+def load(sweep: str | Path, moved: Mapping[str, Path] | None = None, shown: str = "") -> Sweep:
     """Read a sweep: the path of a TOML file, or the name of one that ships with the package.
 
     Parameters
@@ -152,6 +152,8 @@ def load(sweep: str | Path, moved: Mapping[str, Path] | None = None) -> Sweep:
     sweep : str or Path
     moved : mapping of str to Path, optional
         Where files that the sweep and its study refer to lie now, by the path as written.
+    shown : str
+        How messages call the file; its path unless given.
 
     Raises
     ------
@@ -165,13 +167,13 @@ def load(sweep: str | Path, moved: Mapping[str, Path] | None = None) -> Sweep:
             f"unknown sweep {name!r}; "
             + suggestion(name, BUILT_IN, f"give the path of a TOML file, or one of {', '.join(BUILT_IN)}")
         )
-    table = read_toml(path, f"{name}.toml" if name in BUILT_IN else "", moved)
+    table = read_toml(path, f"{name}.toml" if name in BUILT_IN else shown, moved)
     with table:
         return _sweep(path.stem, path, table, moved or {})
 
 
 def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sweep:
-    study = _study(table, moved)
+    study = _study(name, path, table, moved)
     only = table.texts("only", _names(study)) if table.has("only") else []
     runs = studies.select([*study.runs, *study.extras], only)
     if not runs:
@@ -219,7 +221,10 @@ def _lanes(table: Table, metrics: Sequence[str]) -> tuple[float, str]:
     return table.positive("time_step", "s", simd_batch.STEP), device
 
 
-def _study(table: Table, moved: Mapping[str, Path]) -> Study:
+def _study(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Study:
+    """What ``study`` is: a study that ships with the package, a file, or a table with the content of one."""
+    if isinstance(table.values.get("study"), dict):
+        return studies.study_in(name, path, table.table("study"))
     named = table.text("study")
     if named in studies.BUILT_IN:
         return studies.load(named)
@@ -307,20 +312,28 @@ def _spread(name: str, table: Table, method: str) -> Spread:
     return Spread(name, float(numbers[0]), float(numbers[1]), factor, points, logarithmic=logarithmic)
 
 
+def _identified(table: Table) -> Identified:
+    """What ``model`` is: a model's file, or a table with the content of one."""
+    if isinstance(table.values["model"], dict):
+        return identified_in(table.table("model"))
+    return read_identified(table.document.locate(table.text("model")))
+
+
 def _estimates(
     table: Table, laws: set[str]
 ) -> tuple[tuple[Estimate, ...], tuple[tuple[float, ...], ...], tuple[str, ...]]:
     """What `model = "model.toml"` says is uncertain: the law's parameters and the inertia; and what else it holds."""
     if not table.has("model"):
         return (), (), ()
-    found = read_identified(table.document.locate(table.text("model")))
+    found = _identified(table)
     law = {f.name for f in found.model.law.fields}
     own = [i for i, e in enumerate(found.estimates) if e.name.partition("[")[0] in law]
     if own and found.model.law.name not in laws:
+        named = repr(table.values["model"]) if isinstance(table.values["model"], str) else "..."
         raise table.error(
             "model",
             f"holds law {found.model.law.name}, and the friction of the runs is of law {', '.join(sorted(laws))}, "
-            f"which has other parameters; take a study with [friction.NAME] law = {{model = {table.text('model')!r}}}",
+            f"which has other parameters; take a study with [friction.NAME] law = {{model = {named}}}",
         )
     kept = sorted([*own, *(i for i, e in enumerate(found.estimates) if e.name == "inertia")])
     left_out = tuple(e.name for i, e in enumerate(found.estimates) if i not in kept)
