@@ -130,7 +130,7 @@ FOUND: list[tuple[Callable[..., Any], str]] = [
      "arrays, a Record, or arrays by name (t=..., position=..., torque=...)"),
     (lambda: ss.recommend("a.toml", bandwidth=5.0, loop={"kp": 8.0}), "bandwidth=5.0 cannot be combined with loop, "
      "which sets the gains; leave one out"),
-    (lambda: ss.sweep(3), "sweep: file = 3 must be a path or a Sweep"),
+    (lambda: ss.sweep(3), "sweep: file = 3 must be a path, a Sweep or a mapping"),
     (lambda: ss.simulate(AXIS, LOOP, SINE, 1.0, initial=0.1), "simulate: initial = 0.1 must be 2 numbers, "
      "such as (0.0, 0.0), position (rad) and velocity (rad/s)"),
     (lambda: ss.simulate(AXIS, LOOP, SINE, 1.0, dt=1e-3), "unknown argument of simulate 'dt'; choose from axis, check, "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,13 @@ from stickslip.study import study as studies
 from stickslip.study.bench import is_bench
 from stickslip.study.plan import Study, load, select
 from stickslip.study.result import StudyResult
+from stickslip.verbs.plain_given import file_of, insist_on_folder
+from stickslip.verbs.study_given import study_tables
 
 
 @arguments_checked
 def study(
-    file: str | os.PathLike[str] | Study,
+    file: str | os.PathLike[str] | Study | Mapping[str, Any],
     folder: str | os.PathLike[str] | None = None,
     *,
     only: Sequence[str] = (),
@@ -34,10 +36,21 @@ def study(
 
     Parameters
     ----------
-    file : path or Study
-        A TOML file, "thesis", "imperfections" or "thesis-rig", or what `stickslip.study.plan.load` gave.
+    file : path, Study or mapping
+        A TOML file, "thesis", "imperfections" or "thesis-rig", or what `stickslip.study.plan.load` gave. Or the content
+        of such a file as a mapping, in which objects may stand for its tables::
+
+            {
+                "axis": ss.RigidAxis(4e-4, friction),  # or "machines": {"mill": ss.Machine(...)}
+                "references": {"move": (ss.Reference("scurve", ...), 1.0)},  # and the duration, s
+                "controllers": {"PD": ss.Controller(...), "PID": {"gains": ss.pid(...)}},
+            }
+
+        ``friction`` and ``laws`` take `Model`, each of them what `identify` or `recommend` returned where it has one.
+        The folder keeps all this as a file in ``inputs/``.
     folder : path, optional
-        Where to write records, tables, manifest.json and report.html; study-NAME here unless given.
+        Where to write records, tables, manifest.json and report.html; study-NAME here unless given. A study given as a
+        mapping needs it, and has its name.
     only : sequence of str
         Parts of the names of the runs that are wanted, such as ("low", "FF-lugre"); all unless given.
     jobs : int
@@ -61,12 +74,14 @@ def study(
     InputError
         One line that names the key, its value and what is allowed.
     """
-    planned = study_of(file, seeds, ablation)
     if not all(part.strip() for part in only):
         raise InputError(f"only = {list(only)!r} has an empty part; give names like 'low', 'step'")
     wanted = [part.strip() for part in only]
-    out = Path(folder) if folder is not None else Path(f"study-{planned.name}")
-    result = studies.run(planned, out, wanted or None, jobs, progress)
+    insist_on_folder(file, folder, "study")
+    with file_of(file, folder, "study", study_tables) as (readable, shown):
+        planned = study_of(readable, seeds, ablation, shown)
+        out = Path(folder) if folder is not None else Path(f"study-{planned.name}")
+        result = studies.run(planned, out, wanted or None, jobs, progress)
     if report:
         from stickslip.report import write
 
@@ -74,8 +89,10 @@ def study(
     return chosen(result, planned, wanted)
 
 
-def study_of(file: str | os.PathLike[str] | Study, seeds: int | None = None, ablation: bool = True) -> Study:
-    """The study of a file, its experiments with other seeds or without ablation.
+def study_of(
+    file: str | os.PathLike[str] | Study, seeds: int | None = None, ablation: bool = True, shown: str = ""
+) -> Study:
+    """The study of a file, its experiments with other seeds or without ablation; messages call the file `shown`.
 
     Raises
     ------
@@ -95,10 +112,10 @@ def study_of(file: str | os.PathLike[str] | Study, seeds: int | None = None, abl
         return file
     if is_bench(os.fspath(file)):
         raise InputError(
-            f"{os.fspath(file)} is a bench of compensators, not a study; run `stickslip study {os.fspath(file)}` "
-            "(Python: stickslip.study.bench.run_bench)"
+            f"{shown or os.fspath(file)} is a bench of compensators, not a study; run `stickslip study "
+            f"{'FILE' if shown else os.fspath(file)}` (Python: stickslip.study.bench.run_bench)"
         )
-    return load(os.fspath(file), given=given)
+    return load(os.fspath(file), given=given, shown=shown)
 
 
 def chosen(result: StudyResult, planned: Study, only: Sequence[str]) -> StudyResult:

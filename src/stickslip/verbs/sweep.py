@@ -21,6 +21,8 @@ from stickslip.sweep.gains import too_few
 from stickslip.sweep.plan import MOST_CASES, Sweep, load
 from stickslip.sweep.sample import LEVEL
 from stickslip.sweep.summary import summarise, summary_lines, unvaried, write_summary
+from stickslip.verbs.plain_given import file_of, insist_on_folder
+from stickslip.verbs.study_given import sweep_tables
 
 if TYPE_CHECKING:
     import pandas
@@ -115,7 +117,7 @@ class SweepResult:
 
 @arguments_checked
 def sweep(
-    file: str | os.PathLike[str] | Sweep,
+    file: str | os.PathLike[str] | Sweep | Mapping[str, Any],
     folder: str | os.PathLike[str] | None = None,
     *,
     cases: int | None = None,
@@ -132,10 +134,12 @@ def sweep(
 
     Parameters
     ----------
-    file : path or Sweep
-        A TOML file, "thesis-robustness" or "thesis-gain", or what `stickslip.sweep.plan.load` gave.
+    file : path, Sweep or mapping
+        A TOML file, "thesis-robustness" or "thesis-gain", or what `stickslip.sweep.plan.load` gave. Or the content of
+        such a file as a mapping, in which ``study`` may be a mapping as `study` takes it, and ``model`` what `identify`
+        returned. The folder keeps all this as a file in ``inputs/``.
     folder : path, optional
-        Where to write; sweep-NAME here unless given.
+        Where to write; sweep-NAME here unless given. A sweep given as a mapping needs it, and has its name.
     cases : int, optional
         Another number of cases than the file's.
     jobs : int
@@ -160,15 +164,19 @@ def sweep(
     InputError
         One line that names the key, its value and what is allowed.
     """
-    planned = sweep_of(file, cases)
     if jobs < 0:
         raise InputError(f"jobs = {jobs} must be at least 0; 0, or none, is one block a core")
     insist_on_jobs(jobs or 1)
-    out = Path(folder) if folder is not None else Path(f"sweep-{planned.name}")
-    execute.ready(planned, scheduler)
-    manifest = execute.run(
-        planned, out, jobs, "processes" if processes else "threads", scheduler, progress, tell
-    )
+    insist_on_folder(file, folder, "sweep")
+    with file_of(file, folder, "sweep", sweep_tables) as (readable, shown):
+        planned = sweep_of(readable, cases, shown)
+        out = Path(folder) if folder is not None else Path(f"sweep-{planned.name}")
+        execute.ready(planned, scheduler)
+        manifest = execute.run(
+            planned, out, jobs, "processes" if processes else "threads", scheduler, progress, tell
+        )
+        if shown:
+            planned = _kept(planned, out)
     rows = summarise(out, planned)
     if why := too_few(planned.drawn):
         tell(why)
@@ -180,18 +188,28 @@ def sweep(
     return SweepResult(planned, out, rows, manifest, tuple(files))
 
 
-def sweep_of(file: str | os.PathLike[str] | Sweep, cases: int | None = None) -> Sweep:
-    """The sweep of a file, with another number of cases.
+def _kept(planned: Sweep, folder: Path) -> Sweep:
+    """The sweep, its file that of the folder: the one that it was read from goes."""
+    source = folder / "inputs" / planned.source.name
+    own = planned.study.source == planned.source
+    return replace(
+        planned, source=source, study=replace(planned.study, source=source) if own else planned.study
+    )
+
+
+def sweep_of(file: str | os.PathLike[str] | Sweep, cases: int | None = None, shown: str = "") -> Sweep:
+    """The sweep of a file, with another number of cases; messages call the file `shown`.
 
     Raises
     ------
     InputError
         If the file is not a sweep's, or the number cannot be.
     """
-    found = file if isinstance(file, Sweep) else load(os.fspath(file))
-    name = found.name if isinstance(file, Sweep) else os.fspath(file)
+    found = file if isinstance(file, Sweep) else load(os.fspath(file), shown=shown)
+    name = found.name if isinstance(file, Sweep) else shown or os.fspath(file)
     if found.tuned:
-        raise InputError(f"{name} has a table [tune]; run `stickslip tune {name}`")
+        run = "run `ss.tune(...)`" if shown else f"run `stickslip tune {name}`"
+        raise InputError(f"{name} has a table [tune]; {run}")
     if cases is None:
         return found
     if cases < 1:

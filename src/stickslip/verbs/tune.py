@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
-from stickslip.study.files import claim_folder
+from stickslip.study.files import claim_folder, copy_inputs
 from stickslip.sweep.plan import Sweep, load
 from stickslip.sweep.tune import Tuned
 from stickslip.sweep.tune import tune as search
 from stickslip.sweep.tuned_files import write
+from stickslip.verbs.plain_given import file_of
+from stickslip.verbs.study_given import sweep_tables
 
 
 @arguments_checked
 def tune(
-    file: str | os.PathLike[str] | Sweep,
+    file: str | os.PathLike[str] | Sweep | Mapping[str, Any],
     folder: str | os.PathLike[str] | None = None,
     *,
     figures: bool = True,
@@ -29,8 +32,9 @@ def tune(
 
     Parameters
     ----------
-    file : path or Sweep
-        A sweep's TOML file with a table [tune], or what `stickslip.sweep.plan.load` made of it.
+    file : path, Sweep or mapping
+        A sweep's TOML file with a table [tune], or what `stickslip.sweep.plan.load` made of it. Or the content of such
+        a file as a mapping, as `sweep` takes it; the folder then keeps it in ``inputs/``.
     folder : path, optional
         Where tables and figures are written; nothing is written without it.
     figures : bool
@@ -48,8 +52,11 @@ def tune(
     InputError
         One line that names the key, its value and what is allowed.
     """
-    planned = tuning_of(file)
-    out = None if folder is None else claim_folder(Path(folder), planned.name, "tune")
+    with file_of(file, folder, "tune", sweep_tables) as (readable, shown):
+        planned = tuning_of(readable, shown)
+        out = None if folder is None else claim_folder(Path(folder), planned.name, "tune")
+        if out is not None and shown:
+            copy_inputs(out, [(planned.source.name, planned.source), *planned.files.items()])
     found = tuple(search(planned, run, progress) for run in planned.runs)
     if out is not None:
         for tuned in found:
@@ -57,16 +64,16 @@ def tune(
     return found
 
 
-def tuning_of(file: str | os.PathLike[str] | Sweep) -> Sweep:
-    """The sweep of a file with a table [tune].
+def tuning_of(file: str | os.PathLike[str] | Sweep, shown: str = "") -> Sweep:
+    """The sweep of a file with a table [tune]; messages call the file `shown`.
 
     Raises
     ------
     InputError
     """
-    found = file if isinstance(file, Sweep) else load(os.fspath(file))
+    found = file if isinstance(file, Sweep) else load(os.fspath(file), shown=shown)
     if not found.tuned:
-        name = found.name if isinstance(file, Sweep) else os.fspath(file)
+        name = found.name if isinstance(file, Sweep) else shown or os.fspath(file)
         raise InputError(f'{name} has no table [tune]; give at least one [tune."controller.bandwidth_hz"]')
     return found
 
