@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -134,6 +135,15 @@ def test_it_is_the_study_of_the_file_that_somebody_writes(tmp_path: Path) -> Non
     )  # fmt: skip
     found, written = read(mine), load(tmp_path / "written.toml")
     assert [run.fingerprint for run in found.runs] == [run.fingerprint for run in written.runs]
+
+
+@pytest.mark.parametrize("name", ["thesis", "imperfections"])
+def test_a_file_that_ships_is_the_same_as_a_mapping(name: str) -> None:
+    shipped = load(name)
+    found = read(tomllib.loads(shipped.source.read_text(encoding="utf-8")))
+    runs = [*shipped.runs, *shipped.extras]
+    assert [run.fingerprint for run in (*found.runs, *found.extras)] == [run.fingerprint for run in runs]
+    assert (found.responses, found.drives) == (shipped.responses, shipped.drives)
 
 
 def test_the_same_call_goes_on_and_a_changed_mapping_runs_what_changed(tmp_path: Path) -> None:

@@ -128,13 +128,14 @@ class HeldLaws:
     held: dict[str, dict[str, Any]] = field(default_factory=dict[str, dict[str, Any]])
 
     @staticmethod
-    def of(content: Mapping[str, Any]) -> HeldLaws:
+    def of(content: Mapping[str, Any], at: Place) -> HeldLaws:
         """Names that a controller's table uses may mean a machine's own model, and are not given to another."""
         own: Any = content.get("laws", {})
         given = dict(cast("Mapping[Any, Any]", own)) if isinstance(own, Mapping) else {}
         users = (content.get(key) for key in ("controllers", "comparisons", "responses", "drives"))
         named = chain.from_iterable(map(_texts_in, users))
-        return HeldLaws({n: m for n, m in given.items() if isinstance(m, Model)}, {*given, *named})
+        models = ((name, model_of(value, at.key("laws").key(str(name)))) for name, value in given.items())
+        return HeldLaws({name: model for name, model in models if model is not None}, {*given, *named})
 
     def namer(self, at: Place) -> NameOf:
         """What names the laws of the controller that stands there."""

@@ -50,7 +50,7 @@ def study_tables(given: Mapping[str, Any], at: Place) -> dict[str, Any]:
         If something in it is of a wrong kind, or cannot stand in a file; one line that names the key.
     """
     content = mapping_at(given, at, PLAIN)
-    laws = HeldLaws.of(content)
+    laws = HeldLaws.of(content, at)
     out: dict[str, Any] = {}
     for key, value in content.items():
         here = at.key(key)
