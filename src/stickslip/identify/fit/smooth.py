@@ -108,7 +108,9 @@ def seen(series: Array, *weights: Array) -> list[Array]:
 def seen_at(series: Array, weights: Array, places: Rows) -> Array:
     """The same through one set of weights, at some rows alone, shape (places,)."""
     reach = weights.size // 2
-    frames = np.lib.stride_tricks.sliding_window_view(np.pad(series, reach, mode="edge"), weights.size)
+    # Asked for often and of few rows: `np.pad` alone would take half of the time.
+    padded = np.concatenate([np.full(reach, series[0]), series, np.full(reach, series[-1])])
+    frames = np.lib.stride_tricks.sliding_window_view(padded, weights.size)
     count = max(1, GATHERED // weights.size)
     parts = [frames[places[i : i + count]] @ weights for i in range(0, places.size, count)]
     return np.concatenate(parts) if parts else np.zeros(0)

@@ -310,6 +310,14 @@ def orders_tried(rows: Sequence[SlidingRows], axis: ServoAxis, period: float | N
 
 def clear_skew(signals: Sequence[Signals], width: float) -> float:
     """A skew of some rows that shows at a glance, s; 0 where none does: where the search begins."""
+    first, asked = signals[0], (width, tuple(signals[1:]))
+    if asked not in first.glances:
+        first.glances[asked] = at_a_glance(signals, width)
+    return first.glances[asked]
+
+
+def at_a_glance(signals: Sequence[Signals], width: float) -> float:
+    """The same, looked at anew."""
     rows = [sliding_rows(s, Window(width, s.period)) for s in signals]
     period = max(r.signals.period for r in rows)
     reach = math.ceil(LOOKED / period)

@@ -11,6 +11,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -230,7 +231,7 @@ class Harmonic:
         """Sum of its squares: as many as there are rows where windows hide none of it."""
         return float(np.trace(self.products))
 
-    @property
+    @cached_property
     def explained(self) -> float:
         """Power of the residual that its own part explains; none where that part is hardly there."""
         # A harmonic that no row resolves is 0 throughout.

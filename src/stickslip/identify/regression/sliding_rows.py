@@ -32,6 +32,7 @@ CERTAIN = 6.0  # standard deviations of the fine velocity's noise from which on 
 CREEPING = 3e-3  # of the usual speed
 FEWEST = 30  # rows
 DIRECTION = 2  # its column
+KEPT = 2_000_000  # numbers of falls laid out that are kept for another look, at 8 bytes each
 VANISHED = 700.0  # exponent beyond which a fall of friction is 0
 
 
@@ -107,6 +108,12 @@ class Signals:
     @cached_property
     def kept(self) -> dict[Window, SlidingRows]:
         """What windows have shown: most are asked for again, beside another skew or a drift."""
+        return {}
+
+    @cached_property
+    def glances(self) -> dict[tuple[float, tuple[Signals, ...]], float]:
+        """Skews that showed at a glance, s, by the narrowest window's width and the signals that were looked at beside
+        these."""
         return {}
 
 
@@ -188,11 +195,22 @@ class SlidingRows:
     gone: Array
     quick: Array
 
+    @cached_property
+    def laid_out(self) -> dict[tuple[Fall, ...], SlidingRows]:
+        """What `falling_at` was asked for: as much is asked for again beside a drift."""
+        return {}
+
     def falling_at(self, falls: Sequence[Fall]) -> SlidingRows:
         """The same rows, with every one of these falls of friction laid out."""
+        asked = tuple(falls)
+        if asked in self.laid_out:
+            return self.laid_out[asked]
         sign, middle = self.fixed[:, DIRECTION], self.window.weights(0)
         falling = [seen_at(fall.at(self.quick), middle, self.places) * sign for fall in falls]
-        return replace(self, falling=np.column_stack(falling))
+        found = replace(self, falling=np.column_stack(falling))
+        if found.falling.size <= KEPT:
+            self.laid_out[asked] = found
+        return found
 
     @property
     def spacing(self) -> float:
