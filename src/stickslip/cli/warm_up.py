@@ -18,6 +18,7 @@ from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
 from stickslip.arguments import arguments_checked
+from stickslip.cli.demo import LOOP as LOOP_OF_LOG
 from stickslip.errors import StickslipError
 
 SUMMARY = "compile everything once after installation"
@@ -29,24 +30,30 @@ LOOPS = {
     "a cascade with a filter": "kv=60,kvp=0.08,kvi=2,filter=300",
 }
 """Loops as drives have them, beside the PD of the demonstration: each is compiled with its control laws inside."""
+IDENTIFY = ("identify", "demo.csv")
+# The fewest axes: more of them compile nothing.
+RECOMMEND = ("recommend", "axis/model.toml", "--axes", "1", "--confirm", "1")
 STEPS: dict[str, Sequence[str]] = {
     "simulation": ("study", "thesis", "--only", "low,signed,nominal", "--no-report"),
     "a drive's controller": ("simulate", "drive.toml"),
     "a machine of elements": ("simulate", "machine.toml"),
     "pictures": ("law", "lugre", "--plot"),
-    "identification and recommendation": ("demo",),
-    "friction by direction": [
-        "identify",
-        "stickslip-demo/demo.csv",
-        "--per-direction",
-        "--no-report",
+    "a log": ("demo", "--log", "demo.csv"),
+    "the doctor": ("doctor", "demo.csv"),
+    "identification": (
+        *IDENTIFY,
+        "--law",
+        "coulomb",
+        "--law",
+        "stribeck",
+        "--loop",
+        LOOP_OF_LOG,
         "--out",
-        "two.toml",
-    ],
-    **{
-        what: ["recommend", "stickslip-demo/model.toml", "--loop", gains, "--axes", "2", "--confirm", "3"]
-        for what, gains in LOOPS.items()
-    },
+        "axis",
+    ),
+    "friction by direction": (*IDENTIFY, "--per-direction", "--no-report", "--out", "two.toml"),
+    "recommendation": (*RECOMMEND, "--bandwidth", "20", "--counts-per-rev", "65536", "--torque-limit", "3"),
+    **{what: (*RECOMMEND, "--loop", gains) for what, gains in LOOPS.items()},
     "rigs": ("rig", "run", "breakaway", "--rig", "thesis-dry"),
     "sweeps": ("sweep", "thesis-robustness", "--cases", "1", "--jobs", "1", "--no-report"),
 }
