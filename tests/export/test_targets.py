@@ -31,8 +31,9 @@ def held_to_its_check(target, order, export):
     assert result.passed, result.text
 
 
-@pytest.mark.parametrize("law", LAWS, ids=label)
+# Target after target for one law: what is found of its sliding curve is found once.
 @pytest.mark.parametrize("target", ALL.values(), ids=lambda t: t.name)
+@pytest.mark.parametrize("law", LAWS, ids=label)
 def test_a_law_leaves_or_is_refused_with_what_is_lost_and_the_nearest(target, law):
     order = job(law, target)
     try:
