@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import shutil
@@ -63,6 +64,17 @@ def pytest_unconfigure() -> None:
     """What this process made beside pytest's own folders goes with it."""
     for folder in _MADE:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def pytest_collection() -> None:
+    """What collecting makes stays until the end: to look through it for garbage, time and again, finds none."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Nor is it looked through while tests run, nor copied page by page by the processes that they fork."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
