@@ -15,7 +15,9 @@ import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError
 from stickslip.recommend.axes import plants_of
-from stickslip.recommend.recommend import Drive
+from stickslip.recommend.following import simulated
+from stickslip.recommend.plant import Plant
+from stickslip.recommend.recommend import Drive, recommend
 
 QUICK = {"amplitude": 0.2, "axes": 2, "confirm": 3}
 
@@ -98,3 +100,29 @@ def test_a_drive_knows_how_late_it_is() -> None:
     assert Drive(amplitude=0.1).latest == 0.0
     assert Drive(amplitude=0.1, delay=2.0).latest == 2.0
     assert Drive(amplitude=0.1, encoder_counts=counts, machine=replace(dry, delay=3.0)).latest == 3.0
+
+
+def test_a_delay_that_looks_like_seconds_is_told(model: Path) -> None:
+    notes = ss.recommend(model, bandwidth=10.0, delay=2e-3, **QUICK).notes
+    assert any("delay of 0.002 is in samples" in n and "delay=2" in n for n in notes)
+
+
+def test_friction_that_grows_with_the_load_is_not_compensated_as_if_it_did_not() -> None:
+    """What was recommended promised 99 % and left 82 % of the error."""
+    loaded = replace(identified(), axis={**identified().axis, "load_motor": 0.5})
+    with pytest.raises(InputError, match=r"grows with the load \(load_motor\).* identify without --load"):
+        recommend(loaded, Drive(amplitude=0.2), axes=1, confirm=0)
+
+
+@pytest.mark.parametrize("delay", [0.002, 0.1, 0.5, 0.9, 1.5])
+def test_a_load_that_hovers_at_the_break_away_is_no_end_of_a_run(delay: float) -> None:
+    """It came loose by rounding and rested again, ten thousand times a sample, and the run was called diverging."""
+    drive = Drive(10.0, amplitude=0.2)
+    coulomb = ss.Model("coulomb", fc=0.285, sigma2=0.018)
+    moved, prompt = (
+        simulated(Plant(INERTIA, coulomb, delay=d), drive.loop(INERTIA), drive.reference)
+        for d in (delay, 0.0)
+    )
+    assert moved is not None
+    assert prompt is not None
+    assert np.max(np.abs(moved - prompt)) < 2e-3 * (1.0 + delay)

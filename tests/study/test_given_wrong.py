@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.errors import InputError, ModelRemark
 from stickslip.study.rerun import rerun
 from support.given_studies import AXIS, CONTROLLERS, LUGRE, PD, SINE, base, read
 
@@ -137,3 +138,26 @@ def test_what_it_is_given_is_left_as_it_is(tmp_path: Path) -> None:
     shown = repr(content)
     read(content)
     assert repr(content) == shown
+
+
+def test_a_misspelt_key_of_objects_is_called_so(tmp_path: Path) -> None:
+    """What stood there "must be a number, text, True or False"."""
+    given = {
+        "axis": ss.RigidAxis(4e-4, ss.Model("coulomb", fc=0.3)),
+        "controler": {"PD": ss.Controller(ss.pid(1.0, 0.0, 0.1))},
+    }
+    with pytest.raises(InputError, match=r"study: controler: unknown key; did you mean 'controllers'\?"):
+        ss.study(given, tmp_path / "mine")
+
+
+def test_an_axis_whose_friction_is_left_out_is_told(tmp_path: Path) -> None:
+    """Another was given, and it was dropped in silence."""
+    given = {
+        "axis": ss.RigidAxis(4e-4, ss.Model("coulomb", fc=0.3)),
+        "friction": {"worn": ss.Model("dahl", sigma0=1e3, fc=0.2)},
+        "references": {"slow": (ss.Reference("sine", amplitude=0.1, frequency=1.0), 0.1)},
+        "controllers": {"PD": ss.Controller(ss.place("PD", 4e-4, 20.0))},
+    }  # fmt: skip
+    with pytest.warns(ModelRemark, match=r"study: axis: its friction, coulomb, is left out"):
+        runs = ss.study(given, tmp_path / "mine", report=False).runs
+    assert [run.friction for run in runs] == ["worn"]

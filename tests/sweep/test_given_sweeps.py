@@ -11,6 +11,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
+from stickslip.errors import InputError
 from stickslip.sweep.plan import load
 from stickslip.sweep.rerun import rerun
 from stickslip.verbs.plain_given import file_of
@@ -179,3 +180,15 @@ def test_a_mapping_needs_a_folder_and_a_tuning_something_to_tune() -> None:
             ss.InputError, match=r"file = \{\} is empty; give the path of a TOML file, or a mapping"
         ):
             verb({})
+
+
+def test_what_a_sweep_lacks_and_what_is_chosen_and_uncertain_at_once_is_told() -> None:
+    with pytest.raises(
+        InputError, match=r"study is missing; give the name of a study .* or a table \[study\]"
+    ):
+        ss.tune({"cases": 2, "vary": {"friction.fs": {"scale": [0.9, 1.1]}}})
+    both = {"controller.gain": {"range": [0.5, 1.0]}}
+    with pytest.raises(InputError, match=r"controller\.gain varies too"):
+        ss.tune(
+            {"study": "thesis", "only": ["low", "signed", "nominal"], "cases": 2, "vary": both, "tune": both}
+        )

@@ -24,7 +24,6 @@ from stickslip.machines.identified import identified_machine, is_identified
 from stickslip.machines.keys import BY_NAME
 from stickslip.machines.machine import Machine, Sensor
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
-from stickslip.machines.train import Train
 from stickslip.machines.two_mass import ENCODERS, TwoMassAxis
 from stickslip.model import Model
 from stickslip.model_tables import model
@@ -144,7 +143,7 @@ def _part(top: Table, name: str) -> dict[str, Any]:
         return BY_NAME[name].read(table)
 
 
-def _train(top: Table) -> tuple[Train | None, float]:
+def _train(top: Table) -> tuple[FlexibleAxis | TwoMassAxis | None, float]:
     """The inertias and springs of an axis that is not rigid, and the contact's stiffness."""
     if not top.has("two_mass"):
         own = _part(top, "flexible")

@@ -22,8 +22,9 @@ from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.described import described
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
 from stickslip.machines.encoder import Encoder
+from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
-from stickslip.machines.train import Train
+from stickslip.machines.two_mass import TwoMassAxis
 from stickslip.model import Model, level_of_caller
 
 UNITY, NONE, EXACT, EXACTLY = Amplifier(1.0), Harmonics(), Encoder(), Converter()
@@ -67,7 +68,8 @@ class Machine:
     flexible : FlexibleAxis, TwoMassAxis or None
         None: rigid.
     contact : Contact
-        Its law holds as seen at the encoder: printed values.
+        Friction on the last inertia; `flexible_stiffness` is that of its springs there, where its law has them as the
+        encoder sees them.
     amplifier : Amplifier
     cogging : Harmonics
         N·m
@@ -95,7 +97,7 @@ class Machine:
     inertia: Annotated[float, Par("kg·m²", "J", "inertia of the whole axis", positive=True)]
     contact: Contact
     title: str = ""
-    flexible: Train | None = None
+    flexible: FlexibleAxis | TwoMassAxis | None = None
     flexible_stiffness: Annotated[
         float,
         Par(

@@ -15,6 +15,7 @@ from stickslip.analyse.presliding_loop import Loop
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
+from stickslip.machines.machine import SHORT_DELAY
 from stickslip.recommend.candidate_run import Drive
 from stickslip.recommend.plant import Plant
 from stickslip.recommend.sample_time import MIDDLE, WELL_DAMPED
@@ -67,8 +68,9 @@ def refuse_late(found: Identified, drive: Drive, inertia: float) -> None:
             "and the gains"
         )
     best = fastest(found, drive, inertia)
+    rigid = "" if drive.machine else " (of a rigid axis; a belt or a shaft bears less)"
     remedy = (
-        f"give --bandwidth {best:.2g} or less"
+        f"give --bandwidth {best:.2g} or less{rigid}"
         if best
         else "no lower bandwidth is well damped on this machine"
     )
@@ -76,6 +78,15 @@ def refuse_late(found: Identified, drive: Drive, inertia: float) -> None:
         f"a loop of {drive.bandwidth:g} Hz is unstable while the axis slides, {late}, and friction alone keeps it calm "
         f"at rest; {remedy}"
     )
+
+
+def seconds_meant(drive: Drive) -> Iterator[str]:
+    """That a delay is so short that it may be in s."""
+    if drive.delay and drive.delay < SHORT_DELAY:
+        yield (
+            f"The delay of {drive.delay:g} is in samples, so that commands act {drive.delay * drive.sample_time:.3g} s "
+            f"late; if it is in s, give --delay {drive.delay / drive.sample_time:g}."
+        )
 
 
 def hardly_damped_where_late(found: Identified, drive: Drive, inertia: float) -> Iterator[str]:
@@ -86,6 +97,6 @@ def hardly_damped_where_late(found: Identified, drive: Drive, inertia: float) ->
     if peak > WELL_DAMPED and (best := fastest(found, drive, inertia)):
         yield (
             f"With commands {drive.latest:g} samples late this loop is hardly damped while the axis slides (greatest "
-            f"sensitivity {peak:.2g}, where {WELL_DAMPED:g} at most is usual): {best:.2g} Hz would be well damped "
-            "(--bandwidth)."
+            f"sensitivity {peak:.2g}, where {WELL_DAMPED:g} at most is usual): {best:.2g} Hz would be well damped"
+            f"{'' if drive.machine else ' on a rigid axis'} (--bandwidth)."
         )

@@ -17,10 +17,11 @@ import numpy as np
 
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
+from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.machines.rigid import RigidAxis
-from stickslip.machines.train import Train
+from stickslip.machines.two_mass import TwoMassAxis
 from stickslip.simulation.machine.layout import Laid, lay_out_machine
 from stickslip.simulation.train.layout import seat
 
@@ -53,7 +54,7 @@ class Plant(RigidAxis):
     delay: float = 0.0
     bandwidth: float = math.inf
     backward: bool = False
-    flexible: Train | None = None
+    flexible: FlexibleAxis | TwoMassAxis | None = None
     machine: Machine | None = None
 
     @cached_property

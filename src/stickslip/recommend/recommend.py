@@ -29,7 +29,7 @@ from stickslip.recommend.candidates import (
     on_both,
     rings_alone,
 )
-from stickslip.recommend.late import hardly_damped_where_late, refuse_late
+from stickslip.recommend.late import hardly_damped_where_late, refuse_late, seconds_meant
 from stickslip.recommend.long_rest import hunts_alone, hunts_with, long_rests, unsure_at_rest
 from stickslip.recommend.motion_notes import by_reference_velocity, on_motion
 from stickslip.recommend.notes import (
@@ -46,7 +46,14 @@ from stickslip.recommend.notes import (
 from stickslip.recommend.plant import Plant
 from stickslip.recommend.question import cautious, inertia_of, laws_of, with_motion
 from stickslip.recommend.recommendation import Recommendation
-from stickslip.recommend.refusals import doubted_inertia, held, refuse_endless, refuse_unknown, refuse_weak
+from stickslip.recommend.refusals import (
+    doubted_inertia,
+    held,
+    refuse_endless,
+    refuse_loaded,
+    refuse_unknown,
+    refuse_weak,
+)
 
 GAINS = (0.5, 0.7, 0.8, 0.9, 1.0)
 BEYOND = (1.1, 1.25, 1.5)
@@ -101,6 +108,7 @@ def recommend(
     j = inertia_of(found, inertia)
     drive = with_motion(found, drive)
     refuse_unknown(found)
+    refuse_loaded(found)
     refuse_weak(found, drive)
     refuse_late(found, drive, j)
     linear = drive.loop(j)
@@ -135,8 +143,8 @@ def recommend(
     account.end()
     notes = [
         *sampled_as(drive, chosen), *on_motion(drive, found.unit("rad")), *axes_left_out(bench, others, found),
-        *hardly_damped_where_late(found, drive, j), *lag_of(bench.plants[0], first, linear, drive),
-        *by_reference_velocity(chosen, others.plants),
+        *seconds_meant(drive), *hardly_damped_where_late(found, drive, j),
+        *lag_of(bench.plants[0], first, linear, drive), *by_reference_velocity(chosen, others.plants),
         *notes_on(
             found, chosen, choice.candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine,
             drive.delay,

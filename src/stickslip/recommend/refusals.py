@@ -72,6 +72,22 @@ def refuse_unknown(found: Identified) -> None:
         )
 
 
+def refuse_loaded(found: Identified) -> None:
+    """Refuse friction that grows with the torques on the axis: no compensator that is tried has it.
+
+    Raises
+    ------
+    InputError
+    """
+    grows = [name for name in ("load_motor", "load_external") if found.axis.get(name)]
+    if grows:
+        raise InputError(
+            f"{found.path}: its friction is that of an unloaded axis and grows with the load ({', '.join(grows)}), "
+            "which no compensator that is tried here has; identify without --load, for the friction at the loads of "
+            "the record"
+        )
+
+
 def held(found: Identified, alone: Trial | str, drive: Drive, inertia: float | None = None) -> Trial:
     """The linear loop alone on the axis as it was identified, if it holds it: else no compensator is to blame.
 

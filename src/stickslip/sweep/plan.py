@@ -184,6 +184,11 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
     check = table.flag("check", True)
     drawn, left_out = _drawn(table, {r.axis.friction.law.name for r in runs})
     tuned = _spreads(table, "tune", drawn.method, runs) if table.has("tune") else []
+    if both := {s.name for s in tuned} & {s.name for s in drawn.spreads}:
+        raise ConfigError(
+            f"{table.label('tune')}: {min(both)} varies too ([vary]); a number is either chosen or uncertain: leave "
+            "it out of one of them"
+        )
     step, device = _lanes(table, metrics)
     title = table.text("title", _title(name, study, drawn, tuned))
     percentile = table.positive("percentile", "%", 95.0) if tuned else 95.0
@@ -225,6 +230,11 @@ def _study(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> St
     """What ``study`` is: a study that ships with the package, a file, or a table with the content of one."""
     if isinstance(table.values.get("study"), dict):
         return studies.study_in(name, path, table.table("study"))
+    if not table.has("study"):
+        raise ConfigError(
+            f"{table.label('study')} is missing; give the name of a study that ships with the package "
+            f"({', '.join(studies.BUILT_IN)}), the path of a study's file, or a table [study] with the content of one"
+        )
     named = table.text("study")
     if named in studies.BUILT_IN:
         return studies.load(named)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import os
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -15,11 +17,11 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.written import NameOf, block_table, compensator_table, table_as_given
 from stickslip.control_spec import PLACES
-from stickslip.errors import ConfigError, suggestion
+from stickslip.errors import ConfigError, InputError, ModelRemark, suggestion
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.machines.written import tables_of
-from stickslip.model import Reference
+from stickslip.model import Reference, level_of_caller
 from stickslip.study.plan import BUILT_IN, Study
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.laws_given import MODEL, HeldLaws, friction_table, insist_on_home, model_of, model_table
@@ -51,14 +53,14 @@ def study_tables(given: Mapping[str, Any], at: Place) -> dict[str, Any]:
     """
     content = mapping_at(given, at, PLAIN)
     laws = HeldLaws.of(content, at)
-    out: dict[str, Any] = {}
+    out, brought = dict[str, Any](), dict[str, Any]()
     for key, value in content.items():
         here = at.key(key)
         if key == "axis":
             out[key] = _axis(value, here)
-            if isinstance(value, (RigidAxis, IdentificationResult)) and "friction" not in content:
+            if isinstance(value, (RigidAxis, IdentificationResult)):
                 friction = _axis_of(value, here).friction
-                out["friction"] = {friction.law.name: model_table(friction, here)}
+                brought = {friction.law.name: model_table(friction, here)}
         elif key == "comparisons":
             out[key] = {
                 name: _comparison(one, at_one, laws) for name, one, at_one in _family(value, here, PLAIN)
@@ -71,10 +73,27 @@ def study_tables(given: Mapping[str, Any], at: Place) -> dict[str, Any]:
                 name: read_one(one, at_one, laws) for name, one, at_one in _family(value, here, words)
             }
         else:
-            out[key] = plain(value, here)
+            out[key] = _other(key, value, here)
+    if brought and "friction" in content:
+        said = (
+            f"{at.key('axis')}: its friction, {next(iter(brought))}, is left out where friction is given too"
+        )
+        warnings.warn(said, ModelRemark, stacklevel=level_of_caller(2) or 2)
+    elif brought:
+        out["friction"] = brought
     if laws.held:
         out["laws"] = {**out.get("laws", {}), **laws.held}
     return out
+
+
+def _other(key: str, value: Any, at: Place) -> Any:
+    """A key that takes no objects; a misspelt one of those that do is called so."""
+    try:
+        return plain(value, at)
+    except InputError:
+        if near := difflib.get_close_matches(key, ["axis", *FAMILIES], n=1):
+            raise ConfigError(f"{at}: unknown key; did you mean {near[0]!r}?") from None
+        raise
 
 
 def sweep_tables(given: Mapping[str, Any], at: Place) -> dict[str, Any]:

@@ -89,7 +89,7 @@ class Options:
         if self.delay is not None and not (math.isfinite(self.delay) and abs(self.delay) < LONGEST_DELAY):
             raise InputError(
                 f"--delay {self.delay:g} s, the time until the torque acts (below 0 where its column lies behind it), "
-                "must lie between -1 and 1 s"
+                "must lie between -1 and 1 s; it is in s and not in samples: two at 1 kHz are 0.002"
             )
 
 

@@ -50,6 +50,9 @@ MARGIN = 0.05
 """Of the range of what nodes show, by which it may pass them between."""
 STORM = 10000
 """Steps in a sample, after which the motion is no number."""
+DISTINCT = 1e-11
+"""Of the torque that holds, by which a load breaks it away: by rounding alone it would come loose and rest again
+without end, and move by nothing that a number shows."""
 BARELY = 1e-30
 """rad/s, at which the law says what it takes when the contact has just begun to slide."""
 CLOSER, STILL = math.inf, -1.0
@@ -151,9 +154,9 @@ def load_now(plant: Plant) -> float:
 
 @kernel(inline=True)
 def withstood(plant: Plant, side: float) -> float:
-    """The torque that the contact withstands at rest in a direction, N·m."""
+    """The torque beyond which the contact breaks away in a direction, N·m."""
     held = call_holding(plant.machine.holding, side, plant.contact, plant.parameters, plant.surroundings)
-    return plant.now.scale * held
+    return plant.now.scale * held * (1.0 + DISTINCT)
 
 
 @kernel()
