@@ -8,6 +8,7 @@ import os
 import shutil
 import signal
 import tempfile
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import pytest
 from hypothesis import settings
 
 from support import kept_compilers
+from support.places import REFERENCE
 
 # What tests approve stays with them; set before anything is imported, so that other processes inherit it.
 os.environ["STICKSLIP_CONFIG"] = tempfile.mkdtemp(prefix="stickslip-tests-")
@@ -40,8 +42,6 @@ settings.register_profile("stickslip", deadline=None)
 settings.load_profile("stickslip")
 
 TESTS = Path(__file__).parent
-ROOT = TESTS.parent
-REFERENCE = Path(os.environ.get("STICKSLIP_REFERENCE", ROOT.parent / "shared" / "reference"))
 
 
 # Dearest first, by time and the processor's time (the page's files keep a browser and servers busy, or wait for them):
@@ -58,6 +58,40 @@ LONGEST = (
     "study/test_stability_map", "web/test_sent", "identify/test_exponent", "identify/test_prediction_error",
     "test_compiled_code", "simulation/test_lanes", "rigs/test_faults",
 )  # fmt: skip
+
+
+UNAVAILABLE = ("needs a GPU", "needs a machine without a GPU", "needs iec2c")
+"""Reasons to skip that no installation removes: hardware, and matiec (iec2c), which neither Debian nor PyPI has."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    text = "fail if a test is skipped for want of something that Debian, PyPI or the project's data provide"
+    parser.addoption("--every-tool", action="store_true", help=text)
+
+
+def skipped(config: pytest.Config) -> Counter[str]:
+    """Count the skipped tests by reason."""
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    reports = reporter.stats.get("skipped", []) if reporter else []
+    return Counter(r.longrepr[2].removeprefix("Skipped: ") for r in reports)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail a run with --every-tool in which a test was skipped that could have run."""
+    if session.config.getoption("every_tool") and any(
+        not r.startswith(UNAVAILABLE) for r in skipped(session.config)
+    ):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Print the table of what was skipped and why."""
+    if not config.getoption("every_tool"):
+        return
+    terminalreporter.section("skipped, and why")
+    for reason, count in skipped(config).most_common():
+        verdict = "cannot be installed" if reason.startswith(UNAVAILABLE) else "NOT ALLOWED: install it"
+        terminalreporter.write_line(f"{count:5d}  {verdict:23}  {reason}")
 
 
 def pytest_unconfigure() -> None:
@@ -88,6 +122,6 @@ def study_reference() -> dict[tuple[str, str], dict[str, Any]]:
     """The reference's 180 runs by slip rule and case; the test is skipped where they are not there."""
     path = REFERENCE / "study.json"
     if not path.exists():
-        pytest.skip(f"no {path}; set STICKSLIP_REFERENCE")
+        pytest.skip("needs the independent results study.json; STICKSLIP_REFERENCE names their folder")
     rule = {"abs": "literal", "signed": "signed"}
     return {(rule[r["rule"]], r["case"]): r for r in json.loads(path.read_text())["runs"]}

@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
-from pathlib import Path
 from typing import Any
-
-import pytest
 
 from stickslip.record import Record
 from stickslip.thesis.claims import CLAIMS, judge
+from support.places import REFERENCE, needs_reference
 
-REFERENCE = Path(os.environ.get("STICKSLIP_REFERENCE", Path(__file__).parents[3] / "shared" / "reference"))
-needs_reference = pytest.mark.skipif(
-    not (REFERENCE / "claims.json").exists(),
-    reason="the reference results are not here (STICKSLIP_REFERENCE)",
-)
 STATUS = {
     (True, True): "reproduced",
     (False, True): "only literal rule",
@@ -54,14 +46,14 @@ def expected() -> dict[str, dict[str, str]]:
     return {claim["id"]: claim for claim in json.loads((REFERENCE / "claims.json").read_text())}
 
 
-@needs_reference
+@needs_reference("claims.json")
 def test_every_statement_is_there_word_for_word() -> None:
     wanted = expected()
     assert {claim.id for claim in CLAIMS} == set(wanted)
     assert [claim.id for claim in CLAIMS if claim.text != wanted[claim.id]["claim"]] == []
 
 
-@needs_reference
+@needs_reference("claims.json")
 def test_verdicts_on_the_reference_metrics_agree_with_the_reference() -> None:
     view, wanted = ReferenceView(), expected()
     signed, literal = judge(view, "signed"), judge(view, "literal")
@@ -71,7 +63,7 @@ def test_verdicts_on_the_reference_metrics_agree_with_the_reference() -> None:
     assert found == {id: wanted[id]["status"] for id in judged}
 
 
-@needs_reference
+@needs_reference("claims.json")
 def test_a_reason_is_given_exactly_where_a_statement_fails_somewhere() -> None:
     wanted = expected()
     without = {claim.id for claim in CLAIMS if not claim.why}

@@ -26,6 +26,8 @@ def held_to_its_check(target, order, export):
     result = target.check(order, export) if target.check else None
     if result is None:
         return
+    if result.passed is None and "not installed" not in result.text:
+        return  # This law has nothing to run in this target.
     if result.passed is None:
         pytest.skip(result.text)
     assert result.passed, result.text
@@ -52,10 +54,8 @@ def test_a_law_leaves_or_is_refused_with_what_is_lost_and_the_nearest(target, la
     held_to_its_check(target, order, export)
 
 
-@pytest.mark.parametrize("target", ALL.values(), ids=lambda t: t.name)
+@pytest.mark.parametrize("target", [t for t in ALL.values() if t.check], ids=lambda t: t.name)
 def test_a_targets_check_fails_on_a_wrong_export(target, monkeypatch):
-    if target.check is None:
-        pytest.skip("nothing to run")
     right, other = job(ODD, target), Model(ODD, **{k: 1.1 * v for k, v in ODD.example.items()})
     export = target.write(right)
     wrong = target.write(Job(other, right.name, settings=right.settings))

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
-import os
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,9 +17,8 @@ from stickslip.identify.doctor.view import View
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, drive_axis
+from support.places import DATA, ROOT, needs_data
 
-ROOT = Path(__file__).parents[2]
-DATA = Path(os.environ.get("STICKSLIP_DATA", ROOT / "../shared/data"))
 UNITS = {"position": "rad", "motor_torque": "N·m"}
 
 
@@ -193,7 +190,7 @@ def test_play_behind_which_the_encoder_sits_shows_no_travel_of_the_motor():
 # ---- real machines, none of which has play at the motor's side -------------------------------------------------------
 
 
-@pytest.mark.skipif(not (DATA / "emps").is_dir(), reason="no EMPS record")
+@needs_data("emps")
 def test_the_emps_axis_has_none():
     from scipy.io import loadmat
 
@@ -203,7 +200,7 @@ def test_the_emps_axis_has_none():
     assert said(t, q, torque, {"position": "m", "motor_torque": "N"}) == []
 
 
-@pytest.mark.skipif(not (DATA / "screw_drives").is_dir(), reason="no screw drives")
+@needs_data("screw_drives")
 def test_the_screw_drives_have_none_that_shows():
     table = np.genfromtxt(
         DATA / "screw_drives" / "screw_drives.csv.gz", delimiter=",", names=True, dtype=None, encoding="utf-8"
@@ -221,7 +218,7 @@ def test_the_screw_drives_have_none_that_shows():
     assert tried >= 3
 
 
-@pytest.mark.skipif(not (DATA / "kuka_kr300").is_dir(), reason="no KR300 records")
+@needs_data("kuka_kr300")
 def test_a_robots_axes_have_none():
     for letter in "AB":
         table = np.genfromtxt(DATA / "kuka_kr300" / f"record_{letter}.csv.gz", delimiter=",", names=True)

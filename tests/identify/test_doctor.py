@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import os
 import re
 from pathlib import Path
 
@@ -30,8 +29,7 @@ from support.doctor_logs import (
     with_,
     write,
 )
-
-DATA = Path(os.environ.get("STICKSLIP_DATA", Path(__file__).parents[3] / "shared" / "data"))
+from support.places import DATA, needs_data
 
 
 @pytest.mark.parametrize("name", GOOD)
@@ -125,20 +123,21 @@ REAL: list[tuple[str, list[str], set[str]]] = [
 
 
 @pytest.mark.parametrize(
-    ("file", "mapping", "warned"), REAL, ids=[f"{f.split('/')[0]} {len(m)}" for f, m, _ in REAL]
+    ("file", "mapping", "warned"),
+    [
+        pytest.param(*case, marks=needs_data(case[0]), id=f"{case[0].split('/')[0]} {len(case[1])}")
+        for case in REAL
+    ],
 )
 def test_real_records(file, mapping, warned):
-    if not (DATA / file).exists():
-        pytest.skip(f"no {DATA / file}; set STICKSLIP_DATA")
     diagnosis = examine(read(DATA / file, mapping))
     assert diagnosis.errors == ()
     assert {f.code for f in diagnosis.warnings} == warned
 
 
+@needs_data("tribometer")
 def test_the_tribometers_labels_are_right():
     """Its description says 5 N and +-0.114 mm: "uN" and "mm" as labelled give just that."""
-    if not (DATA / "tribometer").exists():
-        pytest.skip(f"no {DATA / 'tribometer'}; set STICKSLIP_DATA")
     record = read(DATA / "tribometer" / "tribometer.txt")
     assert record.units == {"position": "m", "friction_torque": "N", "load": "N"}
     assert np.median(record["load"]) == pytest.approx(5.0, rel=0.01)

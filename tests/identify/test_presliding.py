@@ -1,6 +1,5 @@
 """Pre-sliding loops, lag in sliding, and any law along a measured motion: the thesis's numbers on its own friction."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +21,10 @@ from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.presliding import Presliding
 from stickslip.rigs.virtual import VirtualRig
 from stickslip.simulation.prescribed.motion import Along
+from support.places import DATA, needs_data
 
 SLIDING = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
 PLANT = Model("gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, **SLIDING)
-DATA = Path(os.environ.get("STICKSLIP_DATA", Path(__file__).parents[3] / "shared" / "data"))
 
 
 @pytest.fixture(scope="module")
@@ -168,12 +167,10 @@ def test_any_law_is_fitted_along_a_motion(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@needs_data("tribometer")
 def test_tribometer() -> None:
     """Rows 1 to 16,000 fit, the rest tests: at most 5.5 %, and better than Maxwell-slip with 4 elements."""
-    path = DATA / "tribometer" / "tribometer.txt"
-    if not path.exists():
-        pytest.skip(f"no {path}; set STICKSLIP_DATA")
-    rows = np.genfromtxt(path, skip_header=1)
+    rows = np.genfromtxt(DATA / "tribometer" / "tribometer.txt", skip_header=1)
     measured = Loop(rows[:, 0], rows[:, 2] * 1e-3, rows[:, 3] * 1e-6, ("m", "N"))
     fitted = np.arange(16_000)
     templates = templates_for(measured, fitted)

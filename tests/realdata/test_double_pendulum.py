@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import importlib.util
-import os
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-DATA = Path(os.environ.get("STICKSLIP_DATA", ROOT / "../shared/data")) / "double_pendulum"
+from support.places import DATA, ROOT, needs_data
 
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no data at {DATA}")
+pytestmark = needs_data("double_pendulum")
 
 
 def test_friction_of_both_joints_from_an_irregular_record(capsys: pytest.CaptureFixture[str]) -> None:
@@ -20,7 +17,7 @@ def test_friction_of_both_joints_from_an_irregular_record(capsys: pytest.Capture
     assert spec.loader is not None
     example = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(example)
-    found = example.identify(next(DATA.glob("*_measured.csv")))
+    found = example.identify(next((DATA / "double_pendulum").glob("*_measured.csv")))
     assert "irregular sampling" in capsys.readouterr().out
     for name in ("Fc1", "Fc2", "d", "g2"):
         value, half = found[name]

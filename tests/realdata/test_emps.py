@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,10 +15,10 @@ from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.plugins import law
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
+from support.places import DATA, needs_data
 
-DATA = Path(os.environ.get("STICKSLIP_DATA", Path(__file__).parents[3].parent / "shared" / "data"))
 FILE = DATA / "emps" / "DATA_EMPS.mat"
-pytestmark = pytest.mark.skipif(not FILE.exists(), reason="no EMPS record; STICKSLIP_DATA names its folder")
+pytestmark = needs_data("emps/DATA_EMPS.mat")
 
 PUBLISHED = {
     "inertia": (95.1089, 0.1085),

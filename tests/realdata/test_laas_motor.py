@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -16,11 +13,12 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.regression import regress_axis
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
+from support import places
+from support.places import needs_data
 
-ROOT = Path(__file__).parents[2]
-DATA = Path(os.environ.get("STICKSLIP_DATA", ROOT / "../shared/data")) / "laas_cogging"
+DATA = places.DATA / "laas_cogging"
 
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no data at {DATA}")
+pytestmark = needs_data("laas_cogging")
 
 
 def read(name, reference=False):

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import importlib.util
-import os
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-DATA = Path(os.environ.get("STICKSLIP_DATA", ROOT / "../shared/data")) / "xl330_pendulum"
+from support import places
+from support.places import ROOT, needs_data
 
-pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"no data at {DATA}")
+DATA = places.DATA / "xl330_pendulum"
+
+pytestmark = needs_data("xl330_pendulum")
 
 
 @pytest.fixture(scope="module")

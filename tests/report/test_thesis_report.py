@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-from pathlib import Path
 
 import pytest
 
@@ -13,10 +11,10 @@ from stickslip.report._view import StudyView
 from stickslip.study.result import StudyResult
 from stickslip.study.study import load, run
 from stickslip.thesis.claims import CLAIMS, judge
+from support.places import REFERENCE, needs_reference
 
 pytestmark = pytest.mark.slow
 
-REFERENCE = Path(os.environ.get("STICKSLIP_REFERENCE", Path(__file__).parents[3] / "shared" / "reference"))
 STATUS = {
     (True, True): "reproduced",
     (False, True): "only literal rule",
@@ -31,7 +29,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> StudyResult:
     return run(load("thesis"), tmp_path_factory.mktemp("thesis"))
 
 
-@pytest.mark.skipif(not (REFERENCE / "claims.json").exists(), reason="the reference results are not here")
+@needs_reference("claims.json")
 def test_every_statement_fares_as_in_the_reference(result: StudyResult) -> None:
     view = StudyView(result)
     signed, literal = judge(view, "signed"), judge(view, "literal")

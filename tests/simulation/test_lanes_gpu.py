@@ -23,7 +23,7 @@ np.savez({out!r}, position=found.position, velocity=found.velocity, **found.metr
 HERE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
-@pytest.mark.skipif(find_spec("numba.cuda") is None, reason="this numba has no CUDA target")
+@pytest.mark.skipif(find_spec("numba.cuda") is None, reason="needs a GPU: numba-cuda is not installed")
 def test_the_simulated_gpu_does_what_the_processor_does(tmp_path):
     """To 1e-9 of each number: the last bits of products, sums and exp differ, and events magnify that."""
     plant, helper, out = "gms", "FB-gms", str(tmp_path / "gpu.npz")
@@ -40,7 +40,7 @@ def test_no_gpu_is_told_with_what_was_looked_for():
     from numba import cuda
 
     if cuda.is_available():
-        pytest.skip("this machine has a GPU")
+        pytest.skip("needs a machine without a GPU")
     with pytest.raises(InputError, match=r"looked for NVIDIA's driver.*pip install 'stickslip\[gpu\]'"):
         loops(n=2, duration=0.01)[2].run((), device="gpu")
 
@@ -49,7 +49,7 @@ def test_a_gpu_does_what_the_processor_does():
     from numba import cuda
 
     if not cuda.is_available():
-        pytest.skip("no GPU here")
+        pytest.skip("needs a GPU")
     many = loops("gms", "FB-gms", n=64, duration=0.2)[2]
     there, here = many.run(device="gpu"), many.run()
     assert np.max(np.abs(there.position - here.position)) < 1e-9

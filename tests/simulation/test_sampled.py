@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,6 +17,7 @@ from stickslip.errors import Divergence, InputError, LawError
 from stickslip.simulation.case_arrays import DONE
 from stickslip.simulation.sampled import engine as sampled
 from stickslip.spec import Bristle
+from support.places import REFERENCE, needs_reference
 from support.sampled_loops import (
     CONTROLLERS,
     CURVE,
@@ -60,8 +59,7 @@ def test_the_general_step_tends_to_the_located_flow(law, controller, monkeypatch
 
 
 def reference_table():
-    folder = os.environ.get("STICKSLIP_REFERENCE")
-    path = Path(folder or "none") / "compensators" / "reference.json"
+    path = REFERENCE / "compensators" / "reference.json"
     return json.loads(path.read_text())["table"] if path.exists() else {}
 
 
@@ -74,7 +72,7 @@ CASES = [
 ]
 
 
-@pytest.mark.skipif(not TABLE, reason="the reference is not there")
+@needs_reference("compensators/reference.json")
 @pytest.mark.parametrize(("row", "name", "rms"), CASES, ids=[f"{row}, {case}" for row, case, _ in CASES])
 def test_loops_are_those_of_the_independent_reference(row, name, rms):
     speed, scale, _ = name.split("_")
