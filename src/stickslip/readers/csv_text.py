@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,8 +15,9 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.readers import _scope
+from stickslip.readers import _column_groups
 from stickslip.readers._cells import OF_DAY, cell, clocks_whole, moment, over_midnight
+from stickslip.readers._column_groups import Layout
 from stickslip.readers._signs import between_thousands
 from stickslip.readers._stated_period import is_period
 from stickslip.readers._units import may_be_unit
@@ -71,25 +73,52 @@ def recognise(head: bytes, path: Path) -> bool:
 def read(path: Path) -> Table:
     """Every column of a text table."""
     lines = clocks_whole(_decode(path).splitlines())
-    dialect = _sniff(path, lines)
+    try:
+        layout = _column_groups.find_layout(lines)
+        return _plain(path, lines) if layout is None else _in_groups(lines, layout)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _in_groups(lines: Sequence[str], layout: Layout) -> Table:
+    """Read a table with rows of keys above groups of a time and its channels."""
+    body = [layout.split(line) for line in lines[layout.first :] if line.strip()]
+    decimal = max((".", ","), key=lambda sign: sum(_is_row(cells, sign) for cells in body))
+    dialect = Dialect("\t", decimal, layout.width, layout.first)
+    rows, footer = _without_footer(["\t".join(cells) for cells in body], dialect)
+    values, odd = _values(rows, dialect)
+    clocks = [j for j in layout.starts if j in _clocks(rows, dialect)]
+    columns, renamed = _column_groups.keyed_columns(layout, values, clocks)
+    # The rows after the slower channels have ended are shorter.
+    findings = [
+        *footer,
+        *(f for f in odd if f.code != "short-row"),
+        *renamed,
+        *_column_groups.scaled_channels(layout),
+    ]
+    return Table("csv", columns, _column_groups.project_lines(layout, lines), tuple(findings))
+
+
+def _plain(path: Path, lines: Sequence[str]) -> Table:
+    """Read a table with one row of names."""
+    dialect = _sniff(lines)
     above = [line for line in lines[: dialect.start] if line.strip()]
     header = [dialect.split(COMMENT.sub("", line)) for line in above]
     body = [line for line in lines[dialect.start :] if line.strip()]
     body, findings = _without_headers(body, above, dialect)
     body, footer = _without_footer(body, dialect)
-    try:
-        values, odd = _values(body, dialect)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    values, odd = _values(body, dialect)
     findings += [*footer, *odd]
-    if (groups := _scope.groups(header, dialect.width)) is not None:
+    names, units = _names(header, dialect.width)
+    clocks = _clocks(body, dialect)
+    if starts := _column_groups.time_columns(header, values):
         # The groups of slower channels end earlier.
         findings = [f for f in findings if f.code != "short-row"]
-        return Table("csv", _scope.columns(header, groups, values), _scope.constants(header), tuple(findings))
-    names, units = _names(header, dialect.width)
+        units = ["s" if j in clocks else unit for j, unit in enumerate(units)]
+        columns = _column_groups.timed_columns(names, units, starts, values)
+        return Table("csv", columns, _constants(header, dialect), tuple(findings))
     if values.shape[1] and np.isnan(values[:, -1]).all() and not names[-1]:
         values = values[:, :-1]  # a delimiter ends every line
-    clocks = _clocks(body, dialect)
     columns = tuple(
         Column(
             name or f"column {i + 1}",
@@ -128,36 +157,47 @@ def _decode(path: Path) -> str:
         return data.decode("latin-1")
 
 
-def _sniff(path: Path, lines: Sequence[str]) -> Dialect:
+def _sniff(lines: Sequence[str]) -> Dialect:
     """The dialect under which most lines of a sample are rows of numbers of one width."""
     filled = [(i, line) for i, line in enumerate(lines) if line.strip()]
     sample = filled[:SAMPLE] if len(filled) <= SAMPLE else filled[: SAMPLE // 2] + filled[-SAMPLE // 2 :]
     best, score = None, 0.0
     for delimiter, decimal in DIALECTS:
         trial = Dialect(delimiter, decimal, 0, 0)
-        widths: dict[int, int] = {}
-        for _, line in sample:
-            cells = trial.split(line)
-            if _is_row(cells, decimal):
-                widths[len(cells)] = widths.get(len(cells), 0) + 1
-        if not widths:
+        cut = [trial.split(line) for _, line in sample]
+        rows = [_is_row(cells, decimal) for cells in cut]
+        if not any(rows):
             continue
-        width = max(widths, key=lambda w: (widths[w], w))
+        width, count = _width(cut, rows)
         # A second column is worth more than the last few rows.
-        merit = widths[width] * min(width, 3)
+        merit = count * min(width, 3)
         if merit > score * 1.001:
             best, score = Dialect(delimiter, decimal, width, 0), merit
     if best is None:
         best = _sniff_among_words(filled, sample)
         if best is None:
             raise InputError(
-                f"{path} holds no table of numbers; give a file with one row of numbers a sample"
+                "the file holds no table of numbers; give a file with one row of numbers a sample"
             )
         return best
     start = next(
         i for i, line in filled if len(c := best.split(line)) == best.width and _is_row(c, best.decimal)
     )
     return Dialect(best.delimiter, best.decimal, best.width, start)
+
+
+def _width(cut: Sequence[Sequence[str]], rows: Sequence[bool]) -> tuple[int, int]:
+    """Return the number of columns, and how many rows of numbers they explain.
+
+    The row of names above the first row of numbers has a cell for every column; rows may lack the last cells, as after
+    the end of slower channels. Without such a row, most rows have the width.
+    """
+    widths = Counter(len(cells) for cells, is_row in zip(cut, rows, strict=True) if is_row)
+    widest, first = max(widths), rows.index(True)
+    if first and len(cut[first]) == widest and len(cut[first - 1]) in (widest - 1, widest, widest + 1):
+        return widest, sum(widths.values())
+    width = max(widths, key=lambda w: (widths[w], w))
+    return width, widths[width]
 
 
 def _sniff_among_words(
@@ -192,14 +232,9 @@ def _is_number(value: float | None) -> bool:
 
 
 def _is_row(cells: Sequence[str], decimal: str) -> bool:
-    """Whether most cells are numbers and no other is a word."""
-    numbers = 0
-    for text in cells:
-        value = cell(text, decimal)
-        if value is None:
-            return False
-        numbers += not math.isnan(value)
-    return numbers > 0 and numbers >= 0.5 * len(cells)
+    """Whether a cell is a number, and no other is a word."""
+    found = [cell(text, decimal) for text in cells]
+    return None not in found and any(map(_is_number, found))
 
 
 def _without_headers(
