@@ -16,7 +16,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers import _column_groups
-from stickslip.readers._cells import OF_DAY, cell, clocks_whole, moment, over_midnight
+from stickslip.readers._cells import OF_DAY, cell, clocks_whole, decoded, moment, over_midnight
 from stickslip.readers._column_groups import Layout
 from stickslip.readers._signs import between_thousands
 from stickslip.readers._stated_period import is_period
@@ -72,7 +72,7 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """Every column of a text table."""
-    lines = clocks_whole(_decode(path).splitlines())
+    lines = clocks_whole(decoded(path).splitlines())
     try:
         layout = _column_groups.find_layout(lines)
         return _plain(path, lines) if layout is None else _in_groups(lines, layout)
@@ -143,18 +143,7 @@ def _unread(names: Sequence[str], body: Sequence[str], dialect: Dialect) -> dict
     }
 
 
-# ---- bytes to lines -----------------------------------------------------------------------------------------
-
-
-def _decode(path: Path) -> str:
-    data = path.read_bytes()
-    try:
-        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            return data.decode("utf-16")
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        # Every byte means something in Latin-1; Windows' own signs differ in places no number uses.
-        return data.decode("latin-1")
+# ---- lines to cells -----------------------------------------------------------------------------------------
 
 
 def _sniff(lines: Sequence[str]) -> Dialect:
