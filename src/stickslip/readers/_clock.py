@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,7 @@ PERIODS = (
     "sampling_time",
     "deltat",
     "delta_t",
+    "delta_x",
     "period",
     "abtastzeit",
     "tsample",
@@ -40,6 +42,11 @@ RATES = (
 
 COUNTERS, NEAR = (16, 24, 32), 4.0
 """Bits of a counter of times, and steps by which it may miss the place where it would go on."""
+FIRST = ("position", "velocity", "motor_torque")
+"""Channels whose times are the record's, the first that is present."""
+MOST_FILLED, UNEVEN, EVEN = 0.9, 0.5, 0.95
+"""A column that is sampled slower than others: at most this part of the rows between its first and last value has one,
+and its times are even: this part of the steps is off by at most this part of the usual step. Lost samples are not."""
 SAME = 0.01
 """Part of a stated period by which a column of times may differ from it without a word."""
 
@@ -52,7 +59,7 @@ def time_of(
     first = next(
         (
             columns[by_role[r].column]
-            for r in ("position", "velocity", "motor_torque", *by_role)
+            for r in (*FIRST, *by_role)
             if r in by_role and r != "time"
         ),
         None,
@@ -192,6 +199,59 @@ def _from_start(time: Array, factor: float, found: list[Finding]) -> tuple[Array
     return (time - origin) * factor, origin * factor, found
 
 
+def restated(
+    columns: dict[str, Column], by_role: dict[str, Choice], sample_time: float | None
+) -> dict[str, Column]:
+    """Return the columns with their clocks in the unit in which the first channel has this sample time, s."""
+    first = next((columns[by_role[r].column] for r in (*FIRST, *by_role) if r in by_role and r != "time"), None)
+    if sample_time is None or first is None or first.clock is None or first.clock.size < 2:
+        return columns
+    step = float(np.median(np.diff(first.clock)))
+    factor, start = (sample_time / step if step > 0.0 else 1.0), float(first.clock[0])
+    return {
+        name: column if column.clock is None else replace(column, clock=(column.clock - start) * factor)
+        for name, column in columns.items()
+    }
+
+
+def on_own_clocks(
+    columns: dict[str, Column], by_role: dict[str, Choice], time: Array, origin: float
+) -> tuple[dict[str, Column], Array]:
+    """Give the columns of a table clocks of their own if some are blank in most rows, since they are sampled slower.
+
+    Returns
+    -------
+    columns : dict of str to Column
+    time : array
+        The record's times: those of the first channel among position, velocity and torque, which is not interpolated.
+    """
+    rows = {
+        role: columns[choice.column]
+        for role, choice in by_role.items()
+        if role != "time" and columns[choice.column].clock is None
+        and columns[choice.column].values.size == time.size
+    }  # fmt: skip
+    if not any(_is_slower(column.values, time) for column in rows.values()):
+        return columns, time
+    out = dict(columns)
+    for column in rows.values():
+        known = np.isfinite(column.values) & np.isfinite(time)
+        out[column.name] = replace(column, values=column.values[known], clock=time[known] + origin)
+    first = next((rows[role] for role in FIRST if role in rows), next(iter(rows.values())))
+    clock = out[first.name].clock
+    return out, time if clock is None else clock - origin
+
+
+def _is_slower(values: Array, time: Array) -> bool:
+    """Whether a column is blank between samples at even times: other columns have more samples."""
+    known = np.flatnonzero(np.isfinite(values) & np.isfinite(time))
+    if known.size < 3 or known.size > MOST_FILLED * (known[-1] - known[0] + 1):
+        return False
+    steps = np.diff(time[known])
+    usual = float(np.median(steps))
+    return bool(np.mean(np.abs(steps - usual) <= UNEVEN * usual) >= EVEN)
+
+
 def on_clock(column: Column, time: Array, origin: float, role: str) -> tuple[Array, list[Finding]]:
     """The column at the record's times."""
     if column.clock is None:
@@ -208,6 +268,13 @@ def on_clock(column: Column, time: Array, origin: float, role: str) -> tuple[Arr
     order = np.argsort(own[good], kind="stable")
     values = np.interp(time, own[good][order], column.values[good][order], left=math.nan, right=math.nan)
     text = (
-        f"{role} ({column.name!r}) has times of its own and was interpolated linearly at those of the record"
+        f"{role} ({column.name!r}), sampled every {_period(own[good])}, was interpolated linearly at the record's "
+        f"times, every {_period(time)}"
     )
     return values, [Finding("note", "resampled", text)]
+
+
+def _period(times: Array) -> str:
+    """Return the usual step of times, with its unit."""
+    step = float(np.median(np.diff(times))) if times.size > 1 else math.nan
+    return f"{1e3 * step:.4g} ms"

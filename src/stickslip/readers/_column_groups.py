@@ -19,7 +19,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.readers._cells import cell
+from stickslip.readers._cells import cell, moment
 from stickslip.readers._names import role_of, words
 from stickslip.readers._units import may_be_unit, parse_unit
 from stickslip.readers.table_columns import Array, Column
@@ -224,11 +224,14 @@ def time_columns(header: Sequence[Sequence[str]], values: Array) -> tuple[int, .
 
 
 def _named_times(names: Sequence[str]) -> tuple[int, ...]:
-    """Columns called a time, each with at least one other behind it."""
-    timed = [role_of(n).role == "time" or bool(IN_TIME.fullmatch(n.lower())) for n in names]
-    if not timed or not timed[0] or timed[-1] or any(a and b for a, b in zip(timed, timed[1:], strict=False)):
-        return ()
-    return tuple(j for j, is_time in enumerate(timed) if is_time)
+    """Return the columns called a time ("Time", "time2") or the time of something ("t_pos"), each with others behind."""
+    plain = [role_of(n).role == "time" or bool(IN_TIME.fullmatch(n.lower())) for n in names]
+    of_one = [bool(own := words(n)) and not TIME_WORDS.isdisjoint((own[0], own[-1])) for n in names]
+    for timed in (plain, of_one):
+        apart = not any(a and b for a, b in zip(timed, timed[1:], strict=False))
+        if timed[0] and not timed[-1] and apart and (timed is plain or not any(plain)):
+            return tuple(j for j, is_time in enumerate(timed) if is_time)
+    return ()
 
 
 def _companions(names: Sequence[str]) -> tuple[int, ...]:
@@ -278,7 +281,21 @@ def keyed_columns(
             times[j] = _scope_seconds(ticks[j], _at(layout.rows, "sampletime[ms]", j + 1))
         else:
             times[j] = _stated_seconds(ticks[j], _at(layout.rows, "interval", j + 1), names[j + 1], findings)
+    _later_starts(layout, times, findings)
     return _columns(names, [_unit(text) for text in units], layout.starts, values, times), findings
+
+
+def _later_starts(layout: Layout, times: dict[int, Array], findings: list[Finding]) -> None:
+    """Count groups that start at 0 from the first start, if the row Timestamp states different dates."""
+    starts = {j: moment(_at(layout.rows, "timestamp", j + 1)) for j in layout.starts}
+    stated = [s for s in starts.values() if s is not None]
+    relative = all(t.size and t[0] == 0.0 for t in times.values())
+    if len(stated) < len(starts) or max(stated) == min(stated) or not relative:
+        return
+    for j, start in starts.items():
+        times[j] = times[j] + (start or 0.0) - min(stated)
+    message = f"the channels start {max(stated) - min(stated):.6g} s apart, as the row Timestamp states"
+    findings.append(Finding("note", "start", message))
 
 
 def timed_columns(

@@ -52,7 +52,7 @@ WORDS = _table(
 
 WHOLE = _table(
     """
-    time: t ts secs s sec tout ms msec millis
+    time: t ts secs s sec tout ms msec millis x_value
     position: q qm q_m x y th 6064 607a_actual pl.fb s-0-0051 s-0-0053 px x_m qmes q_act pos_estimate
         encoder.pos_estimate feedback_pulse_counter p_act r2521 phi_m theta_m theta_l q_l q_meas
     velocity: v w dq qd_m dqm dx qdot n 606c vl.fb s-0-0040 vx vel_estimate r0061 r61 r0063 r63 dq_act v_act

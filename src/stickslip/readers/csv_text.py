@@ -18,6 +18,7 @@ from stickslip.finding import Finding
 from stickslip.readers import _column_groups
 from stickslip.readers._cells import OF_DAY, cell, clocks_whole, decoded, moment, over_midnight
 from stickslip.readers._column_groups import Layout
+from stickslip.readers._names import role_of
 from stickslip.readers._signs import between_thousands
 from stickslip.readers._stated_period import is_period
 from stickslip.readers._units import may_be_unit
@@ -126,7 +127,7 @@ def _plain(path: Path, lines: Sequence[str]) -> Table:
             "s" if i in clocks else unit,
         )
         for i, (name, unit) in enumerate(zip(names[: values.shape[1]], units, strict=False))
-        if i not in dialect.words
+        if i not in dialect.words and not (np.isnan(values[:, i]).all() and role_of(name).role == "time")
     )
     unread = _unread(names, body, dialect)
     if unread:
@@ -347,11 +348,16 @@ def _values_one_by_one(
 def _names(header: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[str]]:
     """Names and units of the columns, from the last header rows of about that width."""
     rows = [[c.strip().strip('"').strip() for c in row] for row in header]
+    rows = [row if any(row[width:]) else row[: max(width, 1)] for row in rows]
     rows = [
         row for row in rows if abs(len(row) - width) <= 1 and sum(bool(c) for c in row) >= max(1, width - 2)
     ]
     units = [""] * width
-    if len(rows) > 1 and _all_units(rows[-1]):
+    keyed = next((row for row in rows if row[0].lower() in _column_groups.UNITS and _all_units(row[1:])), None)
+    if keyed is not None and len(rows) > 1:
+        rows.remove(keyed)
+        units = ["", *(_bare(c) for c in _fitted(keyed, width)[1:])]
+    elif len(rows) > 1 and _all_units(rows[-1]):
         units = [_bare(c) for c in _fitted(rows.pop(), width)]
     names = _fitted(rows[-1], width) if rows else [""] * width
     return _distinct(names), units
@@ -388,8 +394,8 @@ def _constants(header: Sequence[Sequence[str]], dialect: Dialect) -> dict[str, f
         cells = [c.strip() for c in row if c.strip()]
         if len(cells) == 1 and re.match(r"[^:=]{1,40}[:=]\s*\S", cells[0]):
             key, value = re.split(r"[:=]", cells[0], maxsplit=1)
-        elif len(cells) == 2 and dialect.width != 2:
-            key, value = cells
+        elif (len(cells) == 2 and dialect.width != 2) or (len(cells) > 2 and len({*cells[1:]}) == 1):
+            key, value = cells[:2]
         elif len(cells) == 3 and is_period(f"{cells[1]} {cells[2]}"):
             key, value = cells[0], f"{cells[1]} {cells[2]}"
         else:
