@@ -57,11 +57,7 @@ def time_of(
     """The record's time in s, what was taken off it, and what is to be said."""
     found: list[Finding] = []
     first = next(
-        (
-            columns[by_role[r].column]
-            for r in (*FIRST, *by_role)
-            if r in by_role and r != "time"
-        ),
+        (columns[by_role[r].column] for r in (*FIRST, *by_role) if r in by_role and r != "time"),
         None,
     )
     if sample_time is not None:
@@ -72,6 +68,13 @@ def time_of(
         if (choice := by_role.pop("time", None)) is not None:
             found += _overruled(choice, columns[choice.column].values, sample_time)
         return np.arange(first.values.size, dtype=np.float64) * sample_time, 0.0, found
+    period = _period_of(table)
+    if (
+        "time" in by_role
+        and period is not None
+        and not np.isfinite(columns[by_role["time"].column].values).any()
+    ):
+        del by_role["time"]
     if "time" in by_role:
         choice = by_role["time"]
         time = _counted_on(columns[choice.column].values, choice, found)
@@ -88,19 +91,11 @@ def time_of(
         return _from_start(time, factor, found)
     if first is not None and first.clock is not None:
         return _from_start(first.clock, 1.0, found)
-    for name, value in table.constants.items():
-        key = name.rsplit(".", 1)[-1].lower()
-        if (
-            isinstance(value, float)
-            and math.isfinite(value)
-            and value > 0.0
-            and key in (*PERIODS, *RATES)
-            and first is not None
-        ):
-            period = value if key in PERIODS else 1.0 / value
-            made = f"there is no column of times; they were made from {name} = {value:g}, as {period:g} s a sample"
-            found.append(Finding("warning", "time-made", made, remedy="if wrong, give --sample-time SECONDS"))
-            return np.arange(first.values.size, dtype=np.float64) * period, 0.0, found
+    if period is not None and first is not None:
+        name, step = period
+        made = f"there is no column of times; they were made from {name} = {table.constants[name]:g}, as {step:g} s a sample"
+        found.append(Finding("warning", "time-made", made, remedy="if wrong, give --sample-time SECONDS"))
+        return np.arange(first.values.size, dtype=np.float64) * step, 0.0, found
     if first is None:
         raise InputError(
             f"no column is known to be a channel among {_some(table)}; say which is which, "
@@ -110,6 +105,15 @@ def time_of(
         f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give "
         f"{_by_header(table)}"
     )
+
+
+def _period_of(table: Table) -> tuple[str, float] | None:
+    """Return the constant of a table that states the sampling period or rate, and the period in s."""
+    for name, value in table.constants.items():
+        key = name.rsplit(".", 1)[-1].lower()
+        if isinstance(value, float) and math.isfinite(value) and value > 0.0 and key in (*PERIODS, *RATES):
+            return name, value if key in PERIODS else 1.0 / value
+    return None
 
 
 def _by_header(table: Table) -> str:
@@ -203,7 +207,9 @@ def restated(
     columns: dict[str, Column], by_role: dict[str, Choice], sample_time: float | None
 ) -> dict[str, Column]:
     """Return the columns with their clocks in the unit in which the first channel has this sample time, s."""
-    first = next((columns[by_role[r].column] for r in (*FIRST, *by_role) if r in by_role and r != "time"), None)
+    first = next(
+        (columns[by_role[r].column] for r in (*FIRST, *by_role) if r in by_role and r != "time"), None
+    )
     if sample_time is None or first is None or first.clock is None or first.clock.size < 2:
         return columns
     step = float(np.median(np.diff(first.clock)))

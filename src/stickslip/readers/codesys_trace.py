@@ -76,9 +76,7 @@ def read(path: Path) -> Table:
     return Table("codesys", tuple(columns), constants, tuple(findings), unread)
 
 
-def _blocks(
-    path: Path, lines: list[str], separator: str
-) -> tuple[list[_Block], dict[str, float | str]]:
+def _blocks(path: Path, lines: list[str], separator: str) -> tuple[list[_Block], dict[str, float | str]]:
     """Return the blocks of samples in their order, and the keys above the first."""
     blocks, names, constants = list[_Block](), dict[str, str](), dict[str, float | str]()
     for number, line in enumerate(lines, 1):

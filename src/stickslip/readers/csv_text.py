@@ -18,7 +18,6 @@ from stickslip.finding import Finding
 from stickslip.readers import _column_groups
 from stickslip.readers._cells import OF_DAY, cell, clocks_whole, decoded, moment, over_midnight
 from stickslip.readers._column_groups import Layout
-from stickslip.readers._names import role_of
 from stickslip.readers._signs import between_thousands
 from stickslip.readers._stated_period import is_period
 from stickslip.readers._units import may_be_unit
@@ -127,7 +126,7 @@ def _plain(path: Path, lines: Sequence[str]) -> Table:
             "s" if i in clocks else unit,
         )
         for i, (name, unit) in enumerate(zip(names[: values.shape[1]], units, strict=False))
-        if i not in dialect.words and not (np.isnan(values[:, i]).all() and role_of(name).role == "time")
+        if i not in dialect.words
     )
     unread = _unread(names, body, dialect)
     if unread:
@@ -353,7 +352,9 @@ def _names(header: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
         row for row in rows if abs(len(row) - width) <= 1 and sum(bool(c) for c in row) >= max(1, width - 2)
     ]
     units = [""] * width
-    keyed = next((row for row in rows if row[0].lower() in _column_groups.UNITS and _all_units(row[1:])), None)
+    keyed = next(
+        (row for row in rows if row[0].lower() in _column_groups.UNITS and _all_units(row[1:])), None
+    )
     if keyed is not None and len(rows) > 1:
         rows.remove(keyed)
         units = ["", *(_bare(c) for c in _fitted(keyed, width)[1:])]
