@@ -93,7 +93,8 @@ def time_of(
         return _from_start(first.clock, 1.0, found)
     if period is not None and first is not None:
         name, step = period
-        made = f"there is no column of times; they were made from {name} = {table.constants[name]:g}, as {step:g} s a sample"
+        stated = f"{name} = {table.constants[name]:g}"
+        made = f"there is no column of times; they were made from {stated}, as {step:g} s a sample"
         found.append(Finding("warning", "time-made", made, remedy="if wrong, give --sample-time SECONDS"))
         return np.arange(first.values.size, dtype=np.float64) * step, 0.0, found
     if first is None:

@@ -224,7 +224,7 @@ def time_columns(header: Sequence[Sequence[str]], values: Array) -> tuple[int, .
 
 
 def _named_times(names: Sequence[str]) -> tuple[int, ...]:
-    """Return the columns called a time ("Time", "time2") or the time of something ("t_pos"), each with others behind."""
+    """Return the columns called a time ("time2") or the time of something ("t_pos"), each with others behind."""
     plain = [role_of(n).role == "time" or bool(IN_TIME.fullmatch(n.lower())) for n in names]
     of_one = [bool(own := words(n)) and not TIME_WORDS.isdisjoint((own[0], own[-1])) for n in names]
     for timed in (plain, of_one):
