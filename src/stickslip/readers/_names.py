@@ -20,8 +20,6 @@ from stickslip.readers._vocabulary import (
     ERROR,
     FORCE,
     FORCE_SYMBOL,
-    LETTERED,
-    LETTERS,
     LOAD_SIDE,
     MOTOR_SIDE,
     NO_SIGNAL,
@@ -77,6 +75,8 @@ IN_BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]{1,24}?)\s*[\])>}]")
 INDEX = re.compile(r"\[\s*(\d{1,3})\s*\]|\(\s*(\d{1,3})\s*\)")
 """The index of a column: a whole number alone in brackets is no unit."""
 OF_AXIS = re.compile(r"(joint|axis|achse|gelenk|motor|drive|servo|actuator|axe|eje|j|a|m)(\d{1,2})")
+LETTERED = re.compile(r"(?i)(?:axis|achse|axe|eje)[ _.-]?([a-hx-z])(?=[^a-z0-9]+[a-z])")
+"""An axis's letter, and a quantity behind it: "Axis A Position", but not "axis.fActPos"."""
 AFTER_IN = re.compile(r"\s+in\s+(\S{1,12})\s*$|\s*[/,]\s*(\S{1,12})\s*$", re.IGNORECASE)
 CAMEL = re.compile(r"(?<=[a-zäöüß])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 PIECES = re.compile(r"[_\s]+")
@@ -184,7 +184,9 @@ def _pieces(name: str, unit: str) -> tuple[str, str, list[str], str]:
         bare, inner = _without_tail(bare)
     stated = unit or inner or (bare if bare.lower() in SECONDS else "")
     parts = words(bare)
-    if _whole(bare):
+    if (match := LETTERED.search(bare)) is not None:
+        number, parts = match[1].lower(), words(bare[: match.start(1)] + bare[match.end(1) :])
+    elif _whole(bare):
         groups = words(" ".join(re.split(r"[./|:]", bare)[:-1]))
         number = _numbered_axis([*groups, ""]) if groups else ""
     elif number := _numbered_axis(parts):
@@ -193,15 +195,13 @@ def _pieces(name: str, unit: str) -> tuple[str, str, list[str], str]:
 
 
 def _numbered_axis(parts: list[str]) -> str:
-    """Take the number of the axis out of a name's words: "joint 3 position", "j3 q", "axis a position", "pos 2"."""
+    """Take the number of the axis out of a name's words: "joint 3 position", "j3 q", "pos 2"."""
     for i, word in enumerate(parts[:-1]):
         if (match := OF_AXIS.fullmatch(word)) is not None:
             parts[i : i + 1] = [match[1]] if match[1] in MOTOR_SIDE else []
             return match[2]
         after = parts[i + 1]
-        if word in AXES and (
-            NUMBERED.fullmatch(after) or (len(parts) > i + 2 and word in LETTERED and after in LETTERS)
-        ):
+        if word in AXES and NUMBERED.fullmatch(after):
             del parts[i if word not in MOTOR_SIDE else i + 1 : i + 2]
             return after
     if parts and (match := re.fullmatch(r"([a-z]+)(\d{1,2})", parts[-1])):

@@ -125,8 +125,6 @@ OF_OTHERS = _words("ext external extern contact gravity coriolis disturbance")
 """Words of torques that are not the motor's."""
 AXES = _words("joint axis achse gelenk motor drive servo actuator axe eje")
 """Words that an axis's number follows."""
-LETTERED, LETTERS = _words("axis achse axe eje"), frozenset("abcdefghxyz")
-"""Words that an axis's letter follows, and such letters: others are quantities ("axis i act")."""
 CHANNELS = _words("ch channel kanal ai ao adc col column signal trace")
 """Words whose number is a channel of the instrument, not an axis."""
 NO_TAIL = frozenset(

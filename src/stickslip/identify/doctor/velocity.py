@@ -113,7 +113,10 @@ class Compared:
         even = np.stack([np.ones_like(times), times]).T
         travel, integral = (x - even @ np.linalg.lstsq(even, x, rcond=None)[0] for x in (travel, integral))
         own, other = float(np.sum(travel**2)), float(np.sum(integral**2))
-        if own < DEPARTS**2 * self.given.size * float(np.sum(np.abs(self.velocity)) * self.period) ** 2 or other == 0.0:
+        if (
+            own < DEPARTS**2 * self.given.size * float(np.sum(np.abs(self.velocity)) * self.period) ** 2
+            or other == 0.0
+        ):
             return other > 0.0
         return float(np.sum(travel * integral)) ** 2 > INTEGRATES * own * other
 
