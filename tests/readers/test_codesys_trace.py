@@ -44,8 +44,14 @@ def test_variables_are_channels(tmp_path, decimal, encoding):
 
 @pytest.mark.parametrize(
     ("step", "flags", "period"),
-    [(1000, "Flags; 32\n", 1e-3), (1000, "Flags; 36\n", 1e-3), (4, "Flags; 16\n", 4e-3), (1000, "", 1e-3), (2, "", 2e-3)],
-)  # fmt: skip
+    [
+        (1000, "Flags; 32\n", 1e-3),
+        (1000, "Flags; 36\n", 1e-3),
+        (4, "Flags; 16\n", 4e-3),
+        (1000, "", 1e-3),
+        (2, "", 2e-3),
+    ],
+)
 def test_flags_state_the_unit_of_the_times(tmp_path, step, flags, period):
     record = read(trace(tmp_path / "log.csv", step, flags))
     assert np.median(np.diff(record.time)) == pytest.approx(period)

@@ -41,18 +41,19 @@ def scope(
 ) -> Path:
     """An export with a column of times for each channel, as TwinCAT Scope writes it."""
     rows = [separator.join(line) for line in PROJECT] + ["", ""]
-    for key, index in (
-        ("Name", None),
-        ("SymbolComment", ""),
-        ("SampleTime[ms]", 1),
-        ("Port", 501),
-        ("Unit", 0),
-    ):
-        cells = [
-            [key, str(n if index is None else CHANNELS[n][index] if index in (0, 1) else index)]
-            for n in order
-        ]
-        rows.append(separator.join(sum(cells, [])))
+    for key in ("Name", "SymbolComment", "SampleTime[ms]", "Port", "Unit"):
+        row = list[str]()
+        for name in order:
+            unit, sample_time = CHANNELS[name][:2]
+            said = {
+                "Name": name,
+                "SymbolComment": "",
+                "SampleTime[ms]": sample_time,
+                "Port": 501,
+                "Unit": unit,
+            }
+            row += [key, str(said[key])]
+        rows.append(separator.join(row))
     columns = [CHANNELS[name][2:] for name in order]
     body = zip_longest(*(zip(t, x, strict=True) for t, x in columns))
     for samples in [*body]:
@@ -294,7 +295,7 @@ def test_a_sample_time_restates_every_clock(tmp_path):
 @pytest.mark.parametrize("rows", [1, 3, 20])
 def test_the_header_above_rows_that_lack_most_values(tmp_path, blank, rows):
     """The last of these rows was taken for the header."""
-    names = "time [s],Axis A Position [rad],B [Nm],C [rad],D [rad],E [rad],Axis A Torque [Nm]"
+    names = "time [s],Axis A Position [rad],B,C,D,E,Axis A Torque [Nm]"
     lines = [f"{0.05 * k:.2f},{k}," + ",".join([blank] * 5) for k in range(rows)]
     lines += [f"{0.05 * k:.2f},{k},1,2,3,4,{0.5 * k}" for k in range(rows, 60)]
     (tmp_path / "log.csv").write_text("\n".join([names, *lines]) + "\n")

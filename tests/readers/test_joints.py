@@ -70,11 +70,12 @@ def test_names_of_no_joint(name):
 @pytest.mark.parametrize(
     ("name", "role", "axis"),
     [
-        ("q_0", "position", "0"), ("q0", "position", "0"), ("joint_pos[3]", "position", "3"), ("actual_q_2", "position", "2"),
-        ("joint3.position", "position", "3"), ("joint_3_position", "position", "3"), ("J1_pos", "position", "1"),
-        ("axis0.encoder.pos_estimate", "position", "0"), ("Axis A Position", "position", "a"), ("dq_J_2", "velocity", "2"),
+        ("q_0", "position", "0"), ("q0", "position", "0"), ("joint_pos[3]", "position", "3"),
+        ("actual_q_2", "position", "2"), ("joint3.position", "position", "3"), ("joint_3_position", "position", "3"),
+        ("J1_pos", "position", "1"), ("axis0.encoder.pos_estimate", "position", "0"),
+        ("Axis A Position", "position", "a"), ("Axis 1.ActPos (mm)", "position", "1"), ("dq_J_2", "velocity", "2"),
         ("tau_J_3", "motor_torque", "3"), ("motor_2_torque", "motor_torque", "2"), ("i_q_2", "current", "2"),
-        ("Axis 1.ActPos (mm)", "position", "1"), ("GVL.aAxis[2].fActTorque", "motor_torque", "2"), ("GVL.Axis.fActTorque", "motor_torque", ""),
+        ("GVL.aAxis[2].fActTorque", "motor_torque", "2"), ("GVL.Axis.fActTorque", "motor_torque", ""),
         ("Position Ch1", "position", ""), ("Torque Ch2", "motor_torque", ""), ("motor_i", "current", ""),
         ("axis_i_act", "current", ""), ("GVL.fPosAct", "position", ""),
     ],

@@ -14,6 +14,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -228,7 +229,7 @@ def _named_times(names: Sequence[str]) -> tuple[int, ...]:
     plain = [role_of(n).role == "time" or bool(IN_TIME.fullmatch(n.lower())) for n in names]
     of_one = [bool(own := words(n)) and not TIME_WORDS.isdisjoint((own[0], own[-1])) for n in names]
     for timed in (plain, of_one):
-        apart = not any(a and b for a, b in zip(timed, timed[1:], strict=False))
+        apart = not any(a and b for a, b in pairwise(timed))
         if timed[0] and not timed[-1] and apart and (timed is plain or not any(plain)):
             return tuple(j for j, is_time in enumerate(timed) if is_time)
     return ()
