@@ -303,3 +303,31 @@ def test_the_header_above_rows_that_lack_most_values(tmp_path, blank, rows):
     assert record["position"][0] == 0.0
     assert np.isnan(record["motor_torque"]).sum() == rows
     assert record["motor_torque"][-1] == 29.5
+
+
+def test_the_header_above_rows_without_any_number(tmp_path):
+    rows = ["NaN,NaN"] * 4 + [f"{k},{2 * k}" for k in range(40)]
+    (tmp_path / "log.csv").write_text("position [rad],torque [Nm]\n" + "\n".join(rows) + "\n")
+    record = read(tmp_path / "log.csv", sample_time=0.01)
+    assert np.isnan(record["position"]).sum() == 4
+    assert record["motor_torque"][-1] == 78.0
+
+
+def test_blank_cells_between_blanks_shift_no_value(tmp_path):
+    """The torque of such a row was read as the position."""
+    rows = [
+        f"{0.01 * k:.2f} {k}.5 {2 * k}.5" if k % 7 else f"{0.01 * k:.2f}      {2 * k}.5" for k in range(60)
+    ]
+    (tmp_path / "log.txt").write_text("t[s] pos[deg] torque[Nm]\n" + "\n".join(rows) + "\n")
+    record = read(tmp_path / "log.txt")
+    gone = np.arange(60) % 7 == 0
+    assert np.isnan(record["position"]).tolist() == gone.tolist()
+    assert codes(record) == ["short-row"]
+
+
+def test_a_separator_at_the_end_of_every_line(tmp_path):
+    path = scope(tmp_path / "scope.csv", ("ActTorque", "ActPos"), ";", ",")
+    path.write_text("".join(f"{line};\n" if line else "\n" for line in path.read_text().splitlines()))
+    table = open_table(path)
+    assert [c.name for c in table.columns] == ["ActTorque", "ActPos"]
+    assert not table.findings

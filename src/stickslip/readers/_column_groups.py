@@ -102,7 +102,10 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
     for delimiter in DELIMITERS:
         rows = [(i, _split(line, delimiter)) for i, line in head]
         keyed = [(i, cells) for i, cells in rows if _key(cells) in KEYS]
-        scope = scope or any(_key(cells) in OF_SCOPE for _, cells in keyed)
+        if all(not cells[-1].strip() for _, cells in keyed):
+            keyed = [(i, cells[:-1]) for i, cells in keyed]  # a separator ends every line
+        known = {_key(cells) for _, cells in keyed}
+        scope = scope or (not known.isdisjoint(OF_SCOPE) and len(known) > 1)
         sizes = _sizes(keyed, scope)
         if sizes and (found := _layout(keyed, sizes, delimiter, scope, lines)) is not None:
             return found
@@ -157,8 +160,6 @@ def _layout(
 
 def _sizes_of(cells: Sequence[str]) -> tuple[int, ...]:
     """Return the number of cells between the repetitions of a row's key."""
-    if len(cells) > 2 and not cells[-1].strip() and _key(cells) in NAMES:
-        cells = cells[:-1]  # a separator ends every line
     at = [j for j, text in enumerate(cells) if text.strip().lower() == _key(cells)]
     return tuple(b - a - 1 for a, b in zip(at, [*at[1:], len(cells)], strict=True))
 
@@ -301,13 +302,19 @@ def _later_starts(layout: Layout, times: dict[int, Array], findings: list[Findin
 
 def timed_columns(
     names: Sequence[str], units: Sequence[str], starts: Sequence[int], values: Array
-) -> tuple[Column, ...]:
+) -> tuple[tuple[Column, ...], list[Finding]]:
     """The columns of a table with several columns of times, each with its group's clock."""
-    times = dict[int, Array]()
+    times, findings = dict[int, Array](), list[Finding]()
     for j in starts:
         unit = parse_unit(units[j] or role_of(names[j]).unit)
-        times[j] = values[:, j] * (unit.factor if unit is not None and unit.kind == "time" else 1.0)
-    return _columns(names, units, starts, values, times)
+        known = unit is not None and unit.kind == "time"
+        times[j] = values[:, j] * (unit.factor if unit is not None and known else 1.0)
+        if not known and not findings:
+            message = f"column {names[j]!r} states no unit: its times were taken in s"
+            findings = [
+                Finding("warning", "time-unit", message, remedy="if wrong, give --sample-time SECONDS")
+            ]
+    return _columns(names, units, starts, values, times), findings
 
 
 def _columns(

@@ -113,9 +113,10 @@ def _plain(path: Path, lines: Sequence[str]) -> Table:
     clocks = _clocks(body, dialect)
     if starts := _column_groups.time_columns(header, values):
         # The groups of slower channels end earlier.
-        findings = [f for f in findings if f.code != "short-row"]
+        findings = [f for f in findings if f.code != "short-row" or dialect.delimiter == " "]
         units = ["s" if j in clocks else unit for j, unit in enumerate(units)]
-        columns = _column_groups.timed_columns(names, units, starts, values)
+        columns, assumed = _column_groups.timed_columns(names, units, starts, values)
+        findings += assumed
         return Table("csv", columns, _constants(header, dialect), tuple(findings))
     if values.shape[1] and np.isnan(values[:, -1]).all() and not names[-1]:
         values = values[:, :-1]  # a delimiter ends every line
@@ -169,10 +170,30 @@ def _sniff(lines: Sequence[str]) -> Dialect:
                 "the file holds no table of numbers; give a file with one row of numbers a sample"
             )
         return best
-    start = next(
-        i for i, line in filled if len(c := best.split(line)) == best.width and _is_row(c, best.decimal)
-    )
-    return Dialect(best.delimiter, best.decimal, best.width, start)
+    return replace(best, start=_start(best, filled))
+
+
+def _start(dialect: Dialect, filled: Sequence[tuple[int, str]]) -> int:
+    """Return the index of the first line of samples: below the names, rows may lack cells or have signs for none."""
+    cut = [dialect.split(line) for _, line in filled[:SAMPLE]]
+    full = next((k for k, cells in enumerate(cut) if _is_full(cells, dialect)), None)
+    if full is None:
+        return next(i for i, line in filled if _is_full(dialect.split(line), dialect))
+    first = full
+    while (
+        first and any(c.strip() for c in cut[first - 1]) and not _has_words(cut[first - 1], dialect.decimal)
+    ):
+        first -= 1
+    named = first > 0 and abs(len(cut[first - 1]) - dialect.width) <= 1
+    return filled[first if named else full][0]
+
+
+def _is_full(cells: Sequence[str], dialect: Dialect) -> bool:
+    return len(cells) == dialect.width and _is_row(cells, dialect.decimal)
+
+
+def _has_words(cells: Sequence[str], decimal: str) -> bool:
+    return any(cell(text, decimal) is None for text in cells)
 
 
 def _width(cut: Sequence[Sequence[str]], rows: Sequence[bool]) -> tuple[int, int]:
@@ -310,6 +331,8 @@ def _values_one_by_one(
         cells = dialect.split(line)
         if len(cells) < dialect.width:
             short.append(i)
+            if dialect.delimiter == " ":
+                continue  # which cells are missing cannot be known
         elif any(c.strip() for c in cells[dialect.width :]):
             long.append(i)
         for j, text in enumerate(cells[: dialect.width]):
@@ -326,7 +349,10 @@ def _values_one_by_one(
         findings.append(Finding("warning", code, message, f"row {row + 1}", "correct or delete these rows"))
 
     if short:
-        said = f"{len(short)} rows have fewer than {dialect.width} cells; the rest was taken as missing"
+        rest = "the rest was taken as missing"
+        if dialect.delimiter == " ":
+            rest = "which are missing cannot be known between blanks, so these rows count as missing"
+        said = f"{len(short)} rows have fewer than {dialect.width} cells; {rest}"
         warn("short-row", said, short[0])
     if long:
         warn(
