@@ -61,7 +61,7 @@ def test_the_hand_is_no_joint(tmp_path):
 @pytest.mark.parametrize(
     "name",
     ["ee_pos[0]", "eePos_x", "actual_TCP_pose_0", "actual_TCP_force_1", "wrench.torque.z", "end_effector_position",
-     "tau_ext_hat_filtered[2]", "O_T_EE[3]"],
+     "tau_ext_hat_filtered[2]", "O_T_EE[3]", "CartPos_1", "robot.ee.position[0]"],
 )  # fmt: skip
 def test_names_of_no_joint(name):
     assert role_of(name).role == ""
@@ -112,6 +112,20 @@ def test_columns_of_another_joint_are_not_combined(tmp_path):
     record = read(path, ["position=q_1", "torque=tau_2"])
     (warning,) = [f for f in record.meta["reading"]["findings"] if f["code"] == "ambiguous-column"]
     assert warning["message"] == "motor_torque 'tau_2' is of axis 2, position 'q_1' of axis 1"
+
+
+def test_the_axis_that_has_a_torque_is_taken(tmp_path):
+    columns = {"time": T, "q1": Q[:, 0], "q2": Q[:, 1], "tau2": TAU[:, 1]}
+    assert taken(ss.read(columns)) == {"position": "q2", "motor_torque": "tau2"}
+
+
+def test_one_torque_for_an_array_of_joints_is_not_guessed(tmp_path):
+    path = saved(tmp_path, q=Q, tau=TAU[:, 1])
+    with pytest.raises(
+        InputError, match=r"the file has several axes, and its torque or current names none; say which"
+    ):
+        read(path)
+    assert taken(read(path, ["position=q[1]"])) == {"position": "q[1]", "motor_torque": "tau"}
 
 
 def test_arrays_of_another_size_are_not_combined(tmp_path):

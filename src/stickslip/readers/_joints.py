@@ -77,11 +77,19 @@ class Joints:
             return candidates, []
         if self.plain is not None:
             return [], [self._asked(role, candidates, f"{self.plain[0]} {self.plain[1]!r} names no axis")]
-        choice = f"the file has several axes; axis {axes[0].upper()} was taken"
-        message = f"{role} may be any of {listed_names(candidates)}: {choice}"
+        drives = [name for name in self.names.values() if name.role in ("motor_torque", "current")]
+        driven = {name.axis for name in drives} - {""}
+        axis = next((a for a in axes if a in driven), axes[0])
+        own = [c for c in candidates if self.names[c.name].axis == axis]
+        message = f"{role} may be any of {listed_names(candidates)}: the file has several axes"
+        if role == "position" and drives and not driven and self.names[own[0].name].family.endswith("[]"):
+            message += ", and its torque or current names none"
+            remedy = f"say which it belongs to with --map {role}=COLUMN"
+            return own, [Finding("error", "ambiguous-column", message, remedy=remedy)]
         remedy = f"if another is meant, say --map {role}=COLUMN"
-        found = Finding("warning", "ambiguous-column", message, remedy=remedy)
-        return [c for c in candidates if self.names[c.name].axis == axes[0]], [found]
+        return own, [
+            Finding("warning", "ambiguous-column", f"{message}; axis {axis.upper()} was taken", remedy=remedy)
+        ]
 
     def _together(self, name: str, other: str) -> bool:
         """Whether two columns are of one axis; those of arrays only if both arrays have the same axes."""

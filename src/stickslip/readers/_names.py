@@ -136,7 +136,7 @@ def role_of(name: str, unit: str = "") -> Name:
     """Read a column's name; `unit` is the unit that the file gives besides."""
     bare, stated, parts, axis = _pieces(name, unit)
     family = " ".join(parts) + ("[]" if INDEX.search(name) else "")
-    if not (NO_SIGNAL.isdisjoint(parts) and _is_of_joint(parts)) and not _whole(bare):
+    if not _is_of_joint(parts, axis) or not (NO_SIGNAL.isdisjoint(parts) or _whole(bare)):
         return Name("", 0, stated, axis, "", family)
     role, sure = _role(bare, parts)
     if role:
@@ -152,9 +152,11 @@ def role_of(name: str, unit: str = "") -> Name:
     return Name(role, sure if role else 0, stated, axis, _side(parts, role), family)
 
 
-def _is_of_joint(parts: list[str]) -> bool:
+def _is_of_joint(parts: list[str], axis: str) -> bool:
     """Whether a name may be about an axis or joint: the pose of a hand and the forces on it are not."""
-    return "joint" in parts or CARTESIAN.isdisjoint(parts)
+    # The cart of a pendulum has one position, a Cartesian one has several.
+    cartesian = "cart" in parts and (axis or parts[-1] in ("x", "y", "z"))
+    return "joint" in parts or (CARTESIAN.isdisjoint(parts) and not cartesian)
 
 
 def commanded(name: str) -> bool:
