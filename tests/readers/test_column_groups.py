@@ -170,6 +170,21 @@ def test_a_scale_that_may_not_be_applied_is_noted(tmp_path):
     )
 
 
+def test_a_channel_of_words_and_two_channels_of_one_name(tmp_path):
+    names = ("ActPos", "sState", "ActPos", "ActTorque")
+    symbols = ("Axes.Axis1", "MAIN.s", "Axes.Axis2", "MAIN.m")
+    head = "".join(
+        "\t".join(f"{key}\t{text}" for text in texts) + "\n"
+        for key, texts in (("Name", names), ("SymbolName", symbols), ("SampleTime[ms]", "1111"))
+    )
+    rows = "".join(f"{k}\t{k},5\t{k}\trun\t{k}\t{2 * k}\t{k}\t{3 * k}\n" for k in range(40))
+    (tmp_path / "scope.csv").write_text(head + "\n" + rows)
+    table = open_table(tmp_path / "scope.csv")
+    assert [c.name for c in table.columns] == ["ActPos (Axes.Axis1)", "ActPos (Axes.Axis2)", "ActTorque"]
+    assert [c.values[3] for c in table.columns] == [3.5, 6.0, 9.0]
+    assert table.unread == {"sState": "run"}
+
+
 # ---- LabVIEW ------------------------------------------------------------------------------------------------
 
 N = 300

@@ -76,7 +76,7 @@ class Layout:
     scope: bool
 
     def split(self, line: str) -> list[str]:
-        """Cells of a line of samples."""
+        """Return the cells of a line of samples."""
         if self.delimiter != " ":
             return _split(line, self.delimiter)
         # A blank cell is a blank itself: two in a row with the separator behind it.
@@ -142,11 +142,12 @@ def _layout(
     starts = tuple(sum(sizes[:g]) + g for g in range(len(sizes)))
     rows = {_key(cells): _aligned(cells, sizes) for _, cells in keyed}
     found = Layout(delimiter, starts, width, rows, 0, scope)
-    after = [(i, found.split(lines[i])) for i in range(keyed[-1][0] + 1, len(lines)) if lines[i].strip()]
-    samples = [(i, cells) for i, cells in after if is_row(cells)]
-    if not samples or not (scope or samples[0] == after[0] or len(sizes) > 1):
+    after = [i for i in range(keyed[-1][0] + 1, len(lines)) if lines[i].strip()]
+    first = next((i for i in after if _is_sample(found.split(lines[i]), starts)), None)
+    if first is None or not (scope or first == after[0] or len(sizes) > 1):
         return None
-    for i, cells in samples:
+    for i in range(first, len(lines)):
+        cells = found.split(lines[i])
         if not any(text.strip() for text in cells[width:]):
             continue
         if not scope and len(sizes) == 1:
@@ -155,7 +156,7 @@ def _layout(
             f"line {i + 1} has {len(cells)} cells, but the rows of keys above name {width} columns, separated by "
             f"{delimiter!r}; if the decimal mark is the separator, export the file with another separator"
         )
-    return replace(found, first=samples[0][0])
+    return replace(found, first=first)
 
 
 def _sizes_of(cells: Sequence[str]) -> tuple[int, ...]:
@@ -202,9 +203,9 @@ def _key(cells: Sequence[str]) -> str:
     return cells[0].strip().lower() if cells else ""
 
 
-def is_row(cells: Sequence[str]) -> bool:
-    """Whether cells are numbers, or signs for none, and at least one is a number."""
-    found = [cell(text, ",") for text in cells]
+def _is_sample(cells: Sequence[str], starts: Sequence[int]) -> bool:
+    """Whether the cells of the columns of times are numbers, or signs for none, and at least one is a number."""
+    found = [cell(cells[j], ",") for j in starts if j < len(cells)]
     return None not in found and any(value is not None and not math.isnan(value) for value in found)
 
 
@@ -266,8 +267,11 @@ def _are_clocks(values: Array, starts: Sequence[int]) -> bool:
 
 def keyed_columns(
     layout: Layout, values: Array, clocks: Sequence[int]
-) -> tuple[tuple[Column, ...], list[Finding]]:
-    """The channels below rows of keys, each with its group's clock; `clocks` are the columns of times of day."""
+) -> tuple[tuple[Column, ...], list[str], list[Finding]]:
+    """Return the channels below rows of keys with their groups' clocks, the names of all columns, and findings.
+
+    `clocks` are the columns of times of day.
+    """
     units = next((layout.rows[key] for key in UNITS if key in layout.rows), [""] * layout.width)
     names, findings = _names(layout)
     ticks = {j: values[:, j] for j in layout.starts}
@@ -284,7 +288,7 @@ def keyed_columns(
         else:
             times[j] = _stated_seconds(ticks[j], _at(layout.rows, "interval", j + 1), names[j + 1], findings)
     _later_starts(layout, times, findings)
-    return _columns(names, [_unit(text) for text in units], layout.starts, values, times), findings
+    return _columns(names, [_unit(text) for text in units], layout.starts, values, times), names, findings
 
 
 def _later_starts(layout: Layout, times: dict[int, Array], findings: list[Finding]) -> None:
@@ -359,7 +363,7 @@ def _names(layout: Layout) -> tuple[list[str], list[Finding]]:
         other = [symbols[j] for j in same] if symbols else []
         distinct = len(set(other)) == len(same) and all(other)
         for k, j in enumerate(same):
-            names[j] = other[k] if distinct else name if k == 0 else f"{name} ({k + 1})"
+            names[j] = f"{name} ({other[k]})" if distinct else name if k == 0 else f"{name} ({k + 1})"
     return names, findings
 
 

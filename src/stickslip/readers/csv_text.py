@@ -83,12 +83,23 @@ def read(path: Path) -> Table:
 def _in_groups(lines: Sequence[str], layout: Layout) -> Table:
     """Read a table with rows of keys above groups of a time and its channels."""
     body = [layout.split(line) for line in lines[layout.first :] if line.strip()]
-    decimal = max((".", ","), key=lambda sign: sum(_is_row(cells, sign) for cells in body))
-    dialect = Dialect("\t", decimal, layout.width, layout.first)
+    some = body[:SAMPLE] + body[-SAMPLE:]
+    columns = [[row[j] for row in some if j < len(row)] for j in range(layout.width)]
+    decimal = max(
+        (".", ","), key=lambda sign: sum(_is_number(cell(c, sign)) for cells in columns for c in cells)
+    )
+    words = {
+        j: next(c.strip() for c in cells if c.strip())
+        for j, cells in enumerate(columns)
+        if j not in layout.starts
+        and any(c.strip() for c in cells)
+        and not any(_is_number(cell(c, decimal)) for c in cells)
+    }
+    dialect = Dialect("\t", decimal, layout.width, layout.first, frozenset(words))
     rows, footer = _without_footer(["\t".join(cells) for cells in body], dialect)
     values, odd = _values(rows, dialect)
     clocks = [j for j in layout.starts if j in _clocks(rows, dialect)]
-    columns, renamed = _column_groups.keyed_columns(layout, values, clocks)
+    channels, names, renamed = _column_groups.keyed_columns(layout, values, clocks)
     # The rows after the slower channels have ended are shorter.
     findings = [
         *footer,
@@ -96,7 +107,10 @@ def _in_groups(lines: Sequence[str], layout: Layout) -> Table:
         *renamed,
         *_column_groups.scaled_channels(layout),
     ]
-    return Table("csv", columns, _column_groups.project_lines(layout, lines), tuple(findings))
+    unread = {names[j] or f"column {j + 1}": text[:30] for j, text in words.items()}
+    if unread:
+        findings.append(_left_out(unread))
+    return Table("csv", channels, _column_groups.project_lines(layout, lines), tuple(findings), unread)
 
 
 def _plain(path: Path, lines: Sequence[str]) -> Table:
@@ -131,9 +145,13 @@ def _plain(path: Path, lines: Sequence[str]) -> Table:
     )
     unread = _unread(names, body, dialect)
     if unread:
-        left = ", ".join(f"{name!r} (first {first!r})" for name, first in unread.items())
-        findings.append(Finding("note", "words", f"left out as they hold words, not numbers: {left}"))
+        findings.append(_left_out(unread))
     return Table("csv", columns, _constants(header, dialect), tuple(findings), unread)
+
+
+def _left_out(unread: Mapping[str, str]) -> Finding:
+    left = ", ".join(f"{name!r} (first {first!r})" for name, first in unread.items())
+    return Finding("note", "words", f"left out as they hold words, not numbers: {left}")
 
 
 def _unread(names: Sequence[str], body: Sequence[str], dialect: Dialect) -> dict[str, str]:
@@ -433,5 +451,9 @@ def _constants(header: Sequence[Sequence[str]], dialect: Dialect) -> dict[str, f
 
 
 FORMAT = Format(
-    "csv", "text (CSV, TSV, TwinCAT Scope)", (".csv", ".tsv", ".txt", ".dat", ".asc", ".log"), recognise, read
+    "csv",
+    "text (CSV, TSV, TwinCAT Scope, LabVIEW)",
+    (".csv", ".tsv", ".txt", ".dat", ".asc", ".log", ".lvm"),
+    recognise,
+    read,
 )
