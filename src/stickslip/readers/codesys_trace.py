@@ -117,7 +117,7 @@ def _sample(path: Path, blocks: list[_Block], number: int, rest: str, separator:
 def _unit_of_times(constants: dict[str, float | str], blocks: list[_Block]) -> tuple[float, list[Finding]]:
     """Return the factor to s, from the line Flags or else from the size of the steps, and a note if it is assumed."""
     flags = constants.get("Flags")
-    if isinstance(flags, float) and flags == int(flags):
+    if isinstance(flags, float) and flags.is_integer():
         units = [unit for bit, unit in OF_FLAGS.items() if int(flags) & bit]
         if len(units) == 1:
             return units[0][0], []

@@ -97,7 +97,7 @@ def _in_groups(lines: Sequence[str], layout: Layout) -> Table:
     }
     dialect = Dialect("\t", decimal, layout.width, layout.first, frozenset(words))
     rows, footer = _without_footer(["\t".join(cells) for cells in body], dialect)
-    values, odd = _values(rows, dialect)
+    values, odd = _padded(body[: len(rows)], dialect) or _values(rows, dialect)
     clocks = [j for j in layout.starts if j in _clocks(rows, dialect)]
     channels, names, renamed = _column_groups.keyed_columns(layout, values, clocks)
     # The rows after the slower channels have ended are shorter.
@@ -111,6 +111,19 @@ def _in_groups(lines: Sequence[str], layout: Layout) -> Table:
     if unread:
         findings.append(_left_out(unread))
     return Table("csv", channels, _column_groups.project_lines(layout, lines), tuple(findings), unread)
+
+
+def _padded(body: Sequence[Sequence[str]], dialect: Dialect) -> tuple[Array, list[Finding]] | None:
+    """Return the cells as numbers, NaN where they are blank or absent; None if any is something else."""
+    none = ["nan"] * dialect.width
+    text = [
+        [c.replace(",", ".") if c and not c.isspace() else "nan" for c in row] + none[len(row) :]
+        for row in body
+    ]
+    try:
+        return np.array([row[: dialect.width] for row in text]).astype(np.float64), []
+    except ValueError:
+        return None
 
 
 def _plain(path: Path, lines: Sequence[str]) -> Table:
