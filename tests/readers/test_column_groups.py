@@ -293,6 +293,16 @@ def test_blank_cells_between_slower_samples(tmp_path):
     assert codes(record) == ["resampled"]
 
 
+def test_a_slow_temperature_leaves_the_other_channels_as_they_are(tmp_path):
+    rows = [f"{k},{'' if k == 7 else k},{k},{20 + 0.1 * k if k % 10 == 0 else ''}" for k in range(101)]
+    (tmp_path / "log.csv").write_text(
+        "time [ms],position [rad],torque [Nm],temp [degC]\n" + "\n".join(rows) + "\n"
+    )
+    record = read(tmp_path / "log.csv")
+    assert np.flatnonzero(np.isnan(record["position"])).tolist() == [7]
+    np.testing.assert_allclose(record["temperature"], 20.0 + 0.1 * np.arange(101))
+
+
 def test_lost_samples_are_no_slower_channel(tmp_path):
     lost = np.random.default_rng(0).random(FAST.size) < 0.4
     rows = [f"{1e-3 * t:.3f},{t:.1f},{'' if gone else t:}" for t, gone in zip(FAST, lost, strict=True)]

@@ -238,13 +238,17 @@ def on_own_clocks(
         if role != "time" and columns[choice.column].clock is None
         and columns[choice.column].values.size == time.size
     }  # fmt: skip
-    if not any(_is_slower(column.values, time) for column in rows.values()):
+    slower = {column.name for column in rows.values() if _is_slower(column.values, time)}
+    first = next((rows[role] for role in (*FIRST, *rows) if role in rows), None)
+    if first is None or not slower:
         return columns, time
     out = dict(columns)
     for column in rows.values():
-        known = np.isfinite(column.values) & np.isfinite(time)
-        out[column.name] = replace(column, values=column.values[known], clock=time[known] + origin)
-    first = next((rows[role] for role in FIRST if role in rows), next(iter(rows.values())))
+        if column.name in slower:
+            known = np.isfinite(column.values) & np.isfinite(time)
+            out[column.name] = replace(column, values=column.values[known], clock=time[known] + origin)
+        elif first.name in slower:
+            out[column.name] = replace(column, clock=time + origin)
     clock = out[first.name].clock
     return out, time if clock is None else clock - origin
 
