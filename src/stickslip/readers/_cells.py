@@ -1,4 +1,4 @@
-"""The number in a cell of text: decimal commas, signs between thousands, truth, dates and times of day."""
+"""Text of a file, and the number in a cell of it: decimal commas, thousands, truth, dates and times of day."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 
@@ -41,6 +42,18 @@ OF_DAY = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d)(?:[.,](\d+)|[;:](\d{1
 IN_TWO = re.compile(r"(?<![\d:])((?:[01]?\d|2[0-3]):[0-5]\d:[0-5]\d),(\d{3})(?=,)")
 """A time of day whose milliseconds the comma between cells cuts off."""
 DAY = 86400.0
+
+
+def decoded(path: Path) -> str:
+    """Return the text of a file, in UTF-8, UTF-16 or Latin-1."""
+    data = path.read_bytes()
+    try:
+        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            return data.decode("utf-16")
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        # Every byte means something in Latin-1; Windows' own signs differ in places no number uses.
+        return data.decode("latin-1")
 
 
 def cell(text: str, decimal: str) -> float | None:

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 
 from stickslip.errors import InputError, suggestion
 from stickslip.finding import Finding
+from stickslip.readers._joints import MAIN, Joints, listed_names, with_rates
 from stickslip.readers._names import ALIASES, KINDS, ROLES, Name, motor_force, role_of
 from stickslip.readers._units import in_its_case, may_be_unit, parse_unit, spellings
 from stickslip.readers.table_columns import Column, Table
 
-MAIN = ("time", "position", "velocity", "motor_torque")
-"""Channels that must not be guessed between equals: the wrong one spoils every result."""
 MOTION = ("position", "velocity")
 """Channels that say whether the axis turns or moves along a line."""
 AMBIGUOUS = {"grad": "is a degree in German and a gradian in English; say deg, or 0.9 deg for gradians"}
@@ -95,9 +94,9 @@ def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list
     mapping = meant(table, mapping)
     chosen = {role: _explicit(table, role, text) for role, text in mapping.items() if text.lower() != "none"}
     taken = {choice.column for choice in chosen.values()}
-    names = {c.name: role_of(c.name, _unit_of(c)) for c in table.columns}
-    axis = next((names[c.column].axis for c in chosen.values() if names[c.column].axis), "")
-    findings: list[Finding] = []
+    names = with_rates(table.columns, {c.name: role_of(c.name, _unit_of(c)) for c in table.columns})
+    joints = Joints(names)
+    findings = joints.take([(role, choice.column) for role, choice in chosen.items()])
     for role in ROLES:
         if role in mapping:
             continue
@@ -106,13 +105,15 @@ def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list
             forces = {c.name: read for c in table.columns if (read := motor_force(c.name, _unit_of(c)))}
             names |= forces
             candidates = [c for c in table.columns if c.name in forces and c.name not in taken]
-        column, found = _pick(role, candidates, names, axis)
+        candidates, found = joints.of_one_axis(role, candidates)
+        findings += found
+        column, found = _pick(role, candidates, names)
         findings += found
         if column is None:
             continue
         if role == "motor_torque" and column.name.upper() == "F_N":
             findings.append(_doubtful(column))
-        axis = axis or names[column.name].axis
+        findings += joints.take([(role, column.name)])
         taken.add(column.name)
         chosen[role] = _guessed(role, column, names[column.name])
     return [chosen[role] for role in ROLES if role in chosen], findings
@@ -239,7 +240,7 @@ def _guessed(role: str, column: Column, name: Name) -> Choice:
 
 
 def _pick(
-    role: str, candidates: Sequence[Column], names: Mapping[str, Name], axis: str
+    role: str, candidates: Sequence[Column], names: Mapping[str, Name]
 ) -> tuple[Column | None, list[Finding]]:
     """The best candidate, and what is to be said of the choice."""
     if role == "load":
@@ -253,20 +254,8 @@ def _pick(
             return None, [Finding("note", "not-used", doubt, remedy=remedy)]
     if not candidates:
         return None, []
-    numbered = sorted({names[c.name].axis for c in candidates if names[c.name].axis}, key=int)
     remedy = f"if another is meant, say --map {role}=COLUMN"
-    listed = _listed(candidates)
-    if len(numbered) > 1:
-        wanted = axis if axis in numbered else numbered[0]
-        column = next(c for c in candidates if names[c.name].axis == wanted)
-        return column, [
-            Finding(
-                "warning",
-                "ambiguous-column",
-                f"{role} may be any of {listed}: the file has several axes; {column.name!r} was taken",
-                remedy=remedy,
-            )
-        ]
+    listed = listed_names(candidates)
     ranked = sorted(candidates, key=lambda c: _merit(names[c.name]), reverse=True)
     first = ranked[0]
     if len(ranked) == 1:
@@ -301,8 +290,3 @@ def _pick(
 
 def _merit(name: Name) -> tuple[int, int, int]:
     return (name.side != "load", name.sure, bool(name.unit))
-
-
-def _listed(columns: Sequence[Column]) -> str:
-    shown = [repr(c.name) for c in columns[:4]] + (["..."] if len(columns) > 4 else [])
-    return ", ".join(shown)

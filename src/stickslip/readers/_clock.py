@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,7 @@ PERIODS = (
     "sampling_time",
     "deltat",
     "delta_t",
+    "delta_x",
     "period",
     "abtastzeit",
     "tsample",
@@ -40,6 +42,11 @@ RATES = (
 
 COUNTERS, NEAR = (16, 24, 32), 4.0
 """Bits of a counter of times, and steps by which it may miss the place where it would go on."""
+FIRST = ("position", "velocity", "motor_torque")
+"""Channels whose times are the record's, the first that is present."""
+MOST_FILLED, UNEVEN, EVEN = 0.9, 0.5, 0.95
+"""A column that is sampled slower than others: at most this part of the rows between its first and last value has one,
+and its times are even: this part of the steps is off by at most this part of the usual step. Lost samples are not."""
 SAME = 0.01
 """Part of a stated period by which a column of times may differ from it without a word."""
 
@@ -50,11 +57,7 @@ def time_of(
     """The record's time in s, what was taken off it, and what is to be said."""
     found: list[Finding] = []
     first = next(
-        (
-            columns[by_role[r].column]
-            for r in ("position", "velocity", "motor_torque", *by_role)
-            if r in by_role and r != "time"
-        ),
+        (columns[by_role[r].column] for r in (*FIRST, *by_role) if r in by_role and r != "time"),
         None,
     )
     if sample_time is not None:
@@ -65,6 +68,13 @@ def time_of(
         if (choice := by_role.pop("time", None)) is not None:
             found += _overruled(choice, columns[choice.column].values, sample_time)
         return np.arange(first.values.size, dtype=np.float64) * sample_time, 0.0, found
+    period = _period_of(table)
+    if (
+        "time" in by_role
+        and period is not None
+        and not np.isfinite(columns[by_role["time"].column].values).any()
+    ):
+        del by_role["time"]
     if "time" in by_role:
         choice = by_role["time"]
         time = _counted_on(columns[choice.column].values, choice, found)
@@ -81,19 +91,12 @@ def time_of(
         return _from_start(time, factor, found)
     if first is not None and first.clock is not None:
         return _from_start(first.clock, 1.0, found)
-    for name, value in table.constants.items():
-        key = name.rsplit(".", 1)[-1].lower()
-        if (
-            isinstance(value, float)
-            and math.isfinite(value)
-            and value > 0.0
-            and key in (*PERIODS, *RATES)
-            and first is not None
-        ):
-            period = value if key in PERIODS else 1.0 / value
-            made = f"there is no column of times; they were made from {name} = {value:g}, as {period:g} s a sample"
-            found.append(Finding("warning", "time-made", made, remedy="if wrong, give --sample-time SECONDS"))
-            return np.arange(first.values.size, dtype=np.float64) * period, 0.0, found
+    if period is not None and first is not None:
+        name, step = period
+        stated = f"{name} = {table.constants[name]:g}"
+        made = f"there is no column of times; they were made from {stated}, as {step:g} s a sample"
+        found.append(Finding("warning", "time-made", made, remedy="if wrong, give --sample-time SECONDS"))
+        return np.arange(first.values.size, dtype=np.float64) * step, 0.0, found
     if first is None:
         raise InputError(
             f"no column is known to be a channel among {_some(table)}; say which is which, "
@@ -103,6 +106,15 @@ def time_of(
         f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give "
         f"{_by_header(table)}"
     )
+
+
+def _period_of(table: Table) -> tuple[str, float] | None:
+    """Return the constant of a table that states the sampling period or rate, and the period in s."""
+    for name, value in table.constants.items():
+        key = name.rsplit(".", 1)[-1].lower()
+        if isinstance(value, float) and math.isfinite(value) and value > 0.0 and key in (*PERIODS, *RATES):
+            return name, value if key in PERIODS else 1.0 / value
+    return None
 
 
 def _by_header(table: Table) -> str:
@@ -192,6 +204,65 @@ def _from_start(time: Array, factor: float, found: list[Finding]) -> tuple[Array
     return (time - origin) * factor, origin * factor, found
 
 
+def restated(
+    columns: dict[str, Column], by_role: dict[str, Choice], sample_time: float | None
+) -> dict[str, Column]:
+    """Return the columns with their clocks in the unit in which the first channel has this sample time, s."""
+    first = next(
+        (columns[by_role[r].column] for r in (*FIRST, *by_role) if r in by_role and r != "time"), None
+    )
+    if sample_time is None or first is None or first.clock is None or first.clock.size < 2:
+        return columns
+    step = float(np.median(np.diff(first.clock)))
+    factor, start = (sample_time / step if step > 0.0 else 1.0), float(first.clock[0])
+    return {
+        name: column if column.clock is None else replace(column, clock=(column.clock - start) * factor)
+        for name, column in columns.items()
+    }
+
+
+def on_own_clocks(
+    columns: dict[str, Column], by_role: dict[str, Choice], time: Array, origin: float
+) -> tuple[dict[str, Column], Array]:
+    """Give the columns of a table clocks of their own if some are blank in most rows, since they are sampled slower.
+
+    Returns
+    -------
+    columns : dict of str to Column
+    time : array
+        The record's times: those of the first channel among position, velocity and torque, which is not interpolated.
+    """
+    rows = {
+        role: columns[choice.column]
+        for role, choice in by_role.items()
+        if role != "time" and columns[choice.column].clock is None
+        and columns[choice.column].values.size == time.size
+    }  # fmt: skip
+    slower = {column.name for column in rows.values() if _is_slower(column.values, time)}
+    first = next((rows[role] for role in (*FIRST, *rows) if role in rows), None)
+    if first is None or not slower:
+        return columns, time
+    out = dict(columns)
+    for column in rows.values():
+        if column.name in slower:
+            known = np.isfinite(column.values) & np.isfinite(time)
+            out[column.name] = replace(column, values=column.values[known], clock=time[known] + origin)
+        elif first.name in slower:
+            out[column.name] = replace(column, clock=time + origin)
+    clock = out[first.name].clock
+    return out, time if clock is None else clock - origin
+
+
+def _is_slower(values: Array, time: Array) -> bool:
+    """Whether a column is blank between samples at even times: other columns have more samples."""
+    known = np.flatnonzero(np.isfinite(values) & np.isfinite(time))
+    if known.size < 3 or known.size > MOST_FILLED * (known[-1] - known[0] + 1):
+        return False
+    steps = np.diff(time[known])
+    usual = float(np.median(steps))
+    return bool(np.mean(np.abs(steps - usual) <= UNEVEN * usual) >= EVEN)
+
+
 def on_clock(column: Column, time: Array, origin: float, role: str) -> tuple[Array, list[Finding]]:
     """The column at the record's times."""
     if column.clock is None:
@@ -208,6 +279,13 @@ def on_clock(column: Column, time: Array, origin: float, role: str) -> tuple[Arr
     order = np.argsort(own[good], kind="stable")
     values = np.interp(time, own[good][order], column.values[good][order], left=math.nan, right=math.nan)
     text = (
-        f"{role} ({column.name!r}) has times of its own and was interpolated linearly at those of the record"
+        f"{role} ({column.name!r}), sampled every {_period(own[good])}, was interpolated linearly at the record's "
+        f"times, every {_period(time)}"
     )
     return values, [Finding("note", "resampled", text)]
+
+
+def _period(times: Array) -> str:
+    """Return the usual step of times, with its unit."""
+    step = float(np.median(np.diff(times))) if times.size > 1 else math.nan
+    return f"{1e3 * step:.4g} ms"

@@ -13,6 +13,9 @@ from dataclasses import dataclass
 
 from stickslip.readers._units import Unit, in_its_case, may_be_unit, parse_unit
 from stickslip.readers._vocabulary import (
+    AXES,
+    CARTESIAN,
+    CHANNELS,
     COMPOUNDS,
     ERROR,
     FORCE,
@@ -21,6 +24,7 @@ from stickslip.readers._vocabulary import (
     MOTOR_SIDE,
     NO_SIGNAL,
     NO_TAIL,
+    OF_OTHERS,
     OF_REFERENCE,
     OTHER_COMPOUNDS,
     REFERENCED,
@@ -68,6 +72,11 @@ ALIASES = {
 
 
 IN_BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]{1,24}?)\s*[\])>}]")
+INDEX = re.compile(r"\[\s*(\d{1,3})\s*\]|\(\s*(\d{1,3})\s*\)")
+"""The index of a column: a whole number alone in brackets is no unit."""
+OF_AXIS = re.compile(r"(joint|axis|achse|gelenk|motor|drive|servo|actuator|axe|eje|j|a|m)(\d{1,2})")
+LETTERED = re.compile(r"(?i)(?:axis|achse|axe|eje)[ _.-]?([a-hx-z])(?=[^a-z0-9]+[a-z])")
+"""An axis's letter, and a quantity behind it: "Axis A Position", but not "axis.fActPos"."""
 AFTER_IN = re.compile(r"\s+in\s+(\S{1,12})\s*$|\s*[/,]\s*(\S{1,12})\s*$", re.IGNORECASE)
 CAMEL = re.compile(r"(?<=[a-zäöüß])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 PIECES = re.compile(r"[_\s]+")
@@ -102,8 +111,10 @@ class Name:
     unit : str
         The unit written in the name, or empty.
     axis : str
-        The number that tells axes apart ("pos2" gives "2"), or empty.
+        Number or letter of the axis or joint ("pos2" and "q[2]" give "2", "Axis A Position" gives "a"), or empty.
     side : {"", "motor", "load"}
+    family : str
+        The name without its axis; columns of one array have one family, which ends in "[]".
     """
 
     role: str
@@ -111,6 +122,7 @@ class Name:
     unit: str
     axis: str
     side: str
+    family: str = ""
 
 
 def words(name: str) -> list[str]:
@@ -123,8 +135,9 @@ def words(name: str) -> list[str]:
 def role_of(name: str, unit: str = "") -> Name:
     """Read a column's name; `unit` is the unit that the file gives besides."""
     bare, stated, parts, axis = _pieces(name, unit)
-    if not NO_SIGNAL.isdisjoint(parts) and not _whole(bare):
-        return Name("", 0, stated, "", "")
+    family = " ".join(parts) + ("[]" if INDEX.search(name) else "")
+    if not _is_of_joint(parts, axis) or not (NO_SIGNAL.isdisjoint(parts) or _whole(bare)):
+        return Name("", 0, stated, axis, "", family)
     role, sure = _role(bare, parts)
     if role:
         stated = in_its_case(stated, KINDS[role]) or stated
@@ -136,7 +149,14 @@ def role_of(name: str, unit: str = "") -> Name:
         role = "current"
     if role and parsed is not None and parsed.kind not in KINDS[role]:
         role, sure = "", 0
-    return Name(role, sure if role else 0, stated, axis, _side(parts, role))
+    return Name(role, sure if role else 0, stated, axis, _side(parts, role), family)
+
+
+def _is_of_joint(parts: list[str], axis: str) -> bool:
+    """Whether a name may be about an axis or joint: the pose of a hand and the forces on it are not."""
+    # The cart of a pendulum has one position, a Cartesian one has several.
+    cartesian = "cart" in parts and (axis or parts[-1] in ("x", "y", "z"))
+    return "joint" in parts or (CARTESIAN.isdisjoint(parts) and not cartesian)
 
 
 def commanded(name: str) -> bool:
@@ -160,17 +180,39 @@ def motor_force(name: str, unit: str = "") -> Name | None:
 
 def _pieces(name: str, unit: str) -> tuple[str, str, list[str], str]:
     """A name without its unit, the unit, the name's words, and the number of its axis."""
-    bare, inner = _without_unit(name)
+    indices = [first or second for first, second in INDEX.findall(name)]
+    bare, inner = _without_unit(INDEX.sub("", name))
     if not unit and not inner and not _whole(bare):
         bare, inner = _without_tail(bare)
     stated = unit or inner or (bare if bare.lower() in SECONDS else "")
-    parts, axis = words(bare), ""
-    if not _whole(bare):
-        if parts and (match := re.fullmatch(r"([a-z]+)(\d{1,2})", parts[-1])):
-            parts[-1], axis = match[1], match[2]
-        elif len(parts) > 1 and re.fullmatch(r"\d{1,2}", parts[-1]):
-            axis = parts.pop()
-    return bare, stated, parts, axis
+    parts = words(bare)
+    if (match := LETTERED.search(bare)) is not None:
+        number, parts = match[1].lower(), words(bare[: match.start(1)] + bare[match.end(1) :])
+    elif _whole(bare):
+        groups = words(" ".join(re.split(r"[./|:]", bare)[:-1]))
+        number = _numbered_axis([*groups, ""]) if groups else ""
+    elif number := _numbered_axis(parts):
+        bare = "_".join(parts)
+    return bare, stated, parts, ".".join([number, *indices] if number else indices)
+
+
+def _numbered_axis(parts: list[str]) -> str:
+    """Take the number of the axis out of a name's words: "joint 3 position", "j3 q", "pos 2"."""
+    for i, word in enumerate(parts[:-1]):
+        if (match := OF_AXIS.fullmatch(word)) is not None:
+            parts[i : i + 1] = [match[1]] if match[1] in MOTOR_SIDE else []
+            return match[2]
+        after = parts[i + 1]
+        if word in AXES and NUMBERED.fullmatch(after):
+            del parts[i if word not in MOTOR_SIDE else i + 1 : i + 2]
+            return after
+    if parts and (match := re.fullmatch(r"([a-z]+)(\d{1,2})", parts[-1])):
+        parts[-1] = match[1]
+        return "" if match[1] in CHANNELS else match[2]
+    if len(parts) > 1 and NUMBERED.fullmatch(parts[-1]):
+        number = parts.pop()
+        return "" if parts[-1] in CHANNELS else number
+    return ""
 
 
 def _without_tail(bare: str) -> tuple[str, str]:
@@ -199,10 +241,11 @@ def _without_tail(bare: str) -> tuple[str, str]:
 def _without_unit(name: str) -> tuple[str, str]:
     """The name without the unit in it, and the unit."""
     for match in reversed(list(IN_BRACKETS.finditer(name))):
-        if may_be_unit(match[1]):
+        if may_be_unit(match[1]) and not match[1].isdigit():
             return (name[: match.start()] + " " + name[match.end() :]).strip(), match[1]
-    if (match := AFTER_IN.search(name)) and may_be_unit(match[1] or match[2]):
-        return name[: match.start()].strip(), match[1] or match[2]
+    tail = match[1] or match[2] if (match := AFTER_IN.search(name)) is not None else ""
+    if match is not None and may_be_unit(tail) and not tail.isdigit():
+        return name[: match.start()].strip(), tail
     beside = IN_BRACKETS.sub("", name).strip()
     return (beside if _whole(beside) else name.strip()), ""
 
@@ -265,6 +308,8 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
             return "", 0
         found = [role]
     role = found[0]
+    if role == "motor_torque" and not OF_OTHERS.isdisjoint(parts):
+        return "", 0
     if is_reference and role == "motor_torque":
         return role, 0
     if is_reference:

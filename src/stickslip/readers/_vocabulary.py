@@ -52,7 +52,7 @@ WORDS = _table(
 
 WHOLE = _table(
     """
-    time: t ts secs s sec tout ms msec millis
+    time: t ts secs s sec tout ms msec millis x_value
     position: q qm q_m x y th 6064 607a_actual pl.fb s-0-0051 s-0-0053 px x_m qmes q_act pos_estimate
         encoder.pos_estimate feedback_pulse_counter p_act r2521 phi_m theta_m theta_l q_l q_meas
     velocity: v w dq qd_m dqm dx qdot n 606c vl.fb s-0-0040 vx vel_estimate r0061 r61 r0063 r63 dq_act v_act
@@ -110,7 +110,7 @@ FORCE_SYMBOL = frozenset(["f", "fm", "fmot", "fmotor"])
 MOTOR_SIDE = frozenset(["antrieb", "drive", "mot", "motor", "motorseitig", "rotor"])
 SKIP = _words(
     """
-    achse act actual axes axis estimate fb feedback filtered internal ist istwert joint meas measured mes
+    achse act actual axes axis estimate fb feedback filtered internal ist istwert j joint meas measured mes
     present raw value attuale mesure mesuree reale reel reelle
     """
 )
@@ -119,6 +119,14 @@ NO_SIGNAL = _words(
     counter enable enabled error_code flag gain id index limit mode state status valid
     """
 )
+CARTESIAN = _words("ee eef tcp effector endeffector wrench pose flange cartesian kartesisch xyz")
+"""Words of a robot's hand in space: its position is no joint's angle, the force on it no joint's torque."""
+OF_OTHERS = _words("ext external extern contact gravity coriolis disturbance")
+"""Words of torques that are not the motor's."""
+AXES = _words("joint axis achse gelenk motor drive servo actuator axe eje")
+"""Words that an axis's number follows."""
+CHANNELS = _words("ch channel kanal ai ao adc col column signal trace")
+"""Words whose number is a channel of the instrument, not an axis."""
 NO_TAIL = frozenset(
     ["1", "a", "c", "f", "h", "i", "in", "k", "kp", "lb", "m", "min", "n", "p", "u", "v", "x"]
 )

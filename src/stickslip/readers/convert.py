@@ -10,7 +10,7 @@ from typing import Any
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers._choose import Choice
-from stickslip.readers._clock import on_clock, time_of, times_of
+from stickslip.readers._clock import on_clock, on_own_clocks, restated, time_of, times_of
 from stickslip.readers._names import KINDS, commanded, role_of
 from stickslip.readers._units import SI, Unit, parse_unit
 from stickslip.readers.table_columns import Array, Column, Table
@@ -121,6 +121,8 @@ def convert(
     columns = {c.name: c for c in table.columns}
     time, origin, more = time_of(table, by_role, columns, sample_time)
     said += more
+    columns = restated(columns, by_role, sample_time)
+    columns, time = on_own_clocks(columns, by_role, time, origin)
     if time.size == 0:
         raise InputError("there are no rows; give a record with samples")
     channels: dict[str, Array] = {}

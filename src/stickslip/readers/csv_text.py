@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,8 +15,9 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.readers import _scope
-from stickslip.readers._cells import OF_DAY, cell, clocks_whole, moment, over_midnight
+from stickslip.readers import _column_groups
+from stickslip.readers._cells import OF_DAY, cell, clocks_whole, decoded, moment, over_midnight
+from stickslip.readers._column_groups import Layout
 from stickslip.readers._signs import between_thousands
 from stickslip.readers._stated_period import is_period
 from stickslip.readers._units import may_be_unit
@@ -70,26 +72,81 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """Every column of a text table."""
-    lines = clocks_whole(_decode(path).splitlines())
-    dialect = _sniff(path, lines)
+    lines = clocks_whole(decoded(path).splitlines())
+    try:
+        layout = _column_groups.find_layout(lines)
+        return _plain(path, lines) if layout is None else _in_groups(lines, layout)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _in_groups(lines: Sequence[str], layout: Layout) -> Table:
+    """Read a table with rows of keys above groups of a time and its channels."""
+    body = [layout.split(line) for line in lines[layout.first :] if line.strip()]
+    some = body[:SAMPLE] + body[-SAMPLE:]
+    columns = [[row[j] for row in some if j < len(row)] for j in range(layout.width)]
+    decimal = max(
+        (".", ","), key=lambda sign: sum(_is_number(cell(c, sign)) for cells in columns for c in cells)
+    )
+    words = {
+        j: next(c.strip() for c in cells if c.strip())
+        for j, cells in enumerate(columns)
+        if j not in layout.starts
+        and any(c.strip() for c in cells)
+        and not any(_is_number(cell(c, decimal)) for c in cells)
+    }
+    dialect = Dialect("\t", decimal, layout.width, layout.first, frozenset(words))
+    rows, footer = _without_footer(["\t".join(cells) for cells in body], dialect)
+    values, odd = _padded(body[: len(rows)], dialect) or _values(rows, dialect)
+    clocks = [j for j in layout.starts if j in _clocks(rows, dialect)]
+    channels, names, renamed = _column_groups.keyed_columns(layout, values, clocks)
+    # The rows after the slower channels have ended are shorter.
+    findings = [
+        *footer,
+        *(f for f in odd if f.code != "short-row"),
+        *renamed,
+        *_column_groups.scaled_channels(layout),
+    ]
+    unread = {names[j] or f"column {j + 1}": text[:30] for j, text in words.items()}
+    if unread:
+        findings.append(_left_out(unread))
+    return Table("csv", channels, _column_groups.project_lines(layout, lines), tuple(findings), unread)
+
+
+def _padded(body: Sequence[Sequence[str]], dialect: Dialect) -> tuple[Array, list[Finding]] | None:
+    """Return the cells as numbers, NaN where they are blank or absent; None if any is something else."""
+    none = ["nan"] * dialect.width
+    text = [
+        [c.replace(",", ".") if c and not c.isspace() else "nan" for c in row] + none[len(row) :]
+        for row in body
+    ]
+    try:
+        return np.array([row[: dialect.width] for row in text]).astype(np.float64), []
+    except ValueError:
+        return None
+
+
+def _plain(path: Path, lines: Sequence[str]) -> Table:
+    """Read a table with one row of names."""
+    dialect = _sniff(lines)
     above = [line for line in lines[: dialect.start] if line.strip()]
     header = [dialect.split(COMMENT.sub("", line)) for line in above]
     body = [line for line in lines[dialect.start :] if line.strip()]
     body, findings = _without_headers(body, above, dialect)
     body, footer = _without_footer(body, dialect)
-    try:
-        values, odd = _values(body, dialect)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    values, odd = _values(body, dialect)
     findings += [*footer, *odd]
-    if (groups := _scope.groups(header, dialect.width)) is not None:
-        # The groups of slower channels end earlier.
-        findings = [f for f in findings if f.code != "short-row"]
-        return Table("csv", _scope.columns(header, groups, values), _scope.constants(header), tuple(findings))
     names, units = _names(header, dialect.width)
+    clocks = _clocks(body, dialect)
+    if starts := _column_groups.time_columns(header, values):
+        # The groups of slower channels end earlier.
+        findings = [f for f in findings if f.code != "short-row" or dialect.delimiter == " "]
+        units = ["s" if j in clocks else unit for j, unit in enumerate(units)]
+        columns, assumed = _column_groups.timed_columns(names, units, starts, values)
+        findings += assumed
+        return Table("csv", columns, _constants(header, dialect), tuple(findings))
     if values.shape[1] and np.isnan(values[:, -1]).all() and not names[-1]:
         values = values[:, :-1]  # a delimiter ends every line
-    clocks = _clocks(body, dialect)
     columns = tuple(
         Column(
             name or f"column {i + 1}",
@@ -101,9 +158,13 @@ def read(path: Path) -> Table:
     )
     unread = _unread(names, body, dialect)
     if unread:
-        left = ", ".join(f"{name!r} (first {first!r})" for name, first in unread.items())
-        findings.append(Finding("note", "words", f"left out as they hold words, not numbers: {left}"))
+        findings.append(_left_out(unread))
     return Table("csv", columns, _constants(header, dialect), tuple(findings), unread)
+
+
+def _left_out(unread: Mapping[str, str]) -> Finding:
+    left = ", ".join(f"{name!r} (first {first!r})" for name, first in unread.items())
+    return Finding("note", "words", f"left out as they hold words, not numbers: {left}")
 
 
 def _unread(names: Sequence[str], body: Sequence[str], dialect: Dialect) -> dict[str, str]:
@@ -114,50 +175,70 @@ def _unread(names: Sequence[str], body: Sequence[str], dialect: Dialect) -> dict
     }
 
 
-# ---- bytes to lines -----------------------------------------------------------------------------------------
+# ---- lines to cells -----------------------------------------------------------------------------------------
 
 
-def _decode(path: Path) -> str:
-    data = path.read_bytes()
-    try:
-        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            return data.decode("utf-16")
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        # Every byte means something in Latin-1; Windows' own signs differ in places no number uses.
-        return data.decode("latin-1")
-
-
-def _sniff(path: Path, lines: Sequence[str]) -> Dialect:
+def _sniff(lines: Sequence[str]) -> Dialect:
     """The dialect under which most lines of a sample are rows of numbers of one width."""
     filled = [(i, line) for i, line in enumerate(lines) if line.strip()]
     sample = filled[:SAMPLE] if len(filled) <= SAMPLE else filled[: SAMPLE // 2] + filled[-SAMPLE // 2 :]
     best, score = None, 0.0
     for delimiter, decimal in DIALECTS:
         trial = Dialect(delimiter, decimal, 0, 0)
-        widths: dict[int, int] = {}
-        for _, line in sample:
-            cells = trial.split(line)
-            if _is_row(cells, decimal):
-                widths[len(cells)] = widths.get(len(cells), 0) + 1
-        if not widths:
+        cut = [trial.split(line) for _, line in sample]
+        rows = [_is_row(cells, decimal) for cells in cut]
+        if not any(rows):
             continue
-        width = max(widths, key=lambda w: (widths[w], w))
+        width, count = _width(cut, rows)
         # A second column is worth more than the last few rows.
-        merit = widths[width] * min(width, 3)
+        merit = count * min(width, 3)
         if merit > score * 1.001:
             best, score = Dialect(delimiter, decimal, width, 0), merit
     if best is None:
         best = _sniff_among_words(filled, sample)
         if best is None:
             raise InputError(
-                f"{path} holds no table of numbers; give a file with one row of numbers a sample"
+                "the file holds no table of numbers; give a file with one row of numbers a sample"
             )
         return best
-    start = next(
-        i for i, line in filled if len(c := best.split(line)) == best.width and _is_row(c, best.decimal)
-    )
-    return Dialect(best.delimiter, best.decimal, best.width, start)
+    return replace(best, start=_start(best, filled))
+
+
+def _start(dialect: Dialect, filled: Sequence[tuple[int, str]]) -> int:
+    """Return the index of the first line of samples: below the names, rows may lack cells or have signs for none."""
+    cut = [dialect.split(line) for _, line in filled[:SAMPLE]]
+    full = next((k for k, cells in enumerate(cut) if _is_full(cells, dialect)), None)
+    if full is None:
+        return next(i for i, line in filled if _is_full(dialect.split(line), dialect))
+    first = full
+    while (
+        first and any(c.strip() for c in cut[first - 1]) and not _has_words(cut[first - 1], dialect.decimal)
+    ):
+        first -= 1
+    named = first > 0 and abs(len(cut[first - 1]) - dialect.width) <= 1
+    return filled[first if named else full][0]
+
+
+def _is_full(cells: Sequence[str], dialect: Dialect) -> bool:
+    return len(cells) == dialect.width and _is_row(cells, dialect.decimal)
+
+
+def _has_words(cells: Sequence[str], decimal: str) -> bool:
+    return any(cell(text, decimal) is None for text in cells)
+
+
+def _width(cut: Sequence[Sequence[str]], rows: Sequence[bool]) -> tuple[int, int]:
+    """Return the number of columns, and how many rows of numbers they explain.
+
+    The row of names above the first row of numbers has a cell for every column; rows may lack the last cells, as after
+    the end of slower channels. Without such a row, most rows have the width.
+    """
+    widths = Counter(len(cells) for cells, is_row in zip(cut, rows, strict=True) if is_row)
+    widest, first = max(widths), rows.index(True)
+    if first and len(cut[first]) == widest and len(cut[first - 1]) in (widest - 1, widest, widest + 1):
+        return widest, sum(widths.values())
+    width = max(widths, key=lambda w: (widths[w], w))
+    return width, widths[width]
 
 
 def _sniff_among_words(
@@ -192,14 +273,9 @@ def _is_number(value: float | None) -> bool:
 
 
 def _is_row(cells: Sequence[str], decimal: str) -> bool:
-    """Whether most cells are numbers and no other is a word."""
-    numbers = 0
-    for text in cells:
-        value = cell(text, decimal)
-        if value is None:
-            return False
-        numbers += not math.isnan(value)
-    return numbers > 0 and numbers >= 0.5 * len(cells)
+    """Whether a cell is a number, and no other is a word."""
+    found = [cell(text, decimal) for text in cells]
+    return None not in found and any(map(_is_number, found))
 
 
 def _without_headers(
@@ -286,6 +362,8 @@ def _values_one_by_one(
         cells = dialect.split(line)
         if len(cells) < dialect.width:
             short.append(i)
+            if dialect.delimiter == " ":
+                continue  # which cells are missing cannot be known
         elif any(c.strip() for c in cells[dialect.width :]):
             long.append(i)
         for j, text in enumerate(cells[: dialect.width]):
@@ -302,7 +380,10 @@ def _values_one_by_one(
         findings.append(Finding("warning", code, message, f"row {row + 1}", "correct or delete these rows"))
 
     if short:
-        said = f"{len(short)} rows have fewer than {dialect.width} cells; the rest was taken as missing"
+        rest = "the rest was taken as missing"
+        if dialect.delimiter == " ":
+            rest = "which are missing cannot be known between blanks, so these rows count as missing"
+        said = f"{len(short)} rows have fewer than {dialect.width} cells; {rest}"
         warn("short-row", said, short[0])
     if long:
         warn(
@@ -323,11 +404,18 @@ def _values_one_by_one(
 def _names(header: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[str]]:
     """Names and units of the columns, from the last header rows of about that width."""
     rows = [[c.strip().strip('"').strip() for c in row] for row in header]
+    rows = [row if any(row[width:]) else row[: max(width, 1)] for row in rows]
     rows = [
         row for row in rows if abs(len(row) - width) <= 1 and sum(bool(c) for c in row) >= max(1, width - 2)
     ]
     units = [""] * width
-    if len(rows) > 1 and _all_units(rows[-1]):
+    keyed = next(
+        (row for row in rows if row[0].lower() in _column_groups.UNITS and _all_units(row[1:])), None
+    )
+    if keyed is not None and len(rows) > 1:
+        rows.remove(keyed)
+        units = ["", *(_bare(c) for c in _fitted(keyed, width)[1:])]
+    elif len(rows) > 1 and _all_units(rows[-1]):
         units = [_bare(c) for c in _fitted(rows.pop(), width)]
     names = _fitted(rows[-1], width) if rows else [""] * width
     return _distinct(names), units
@@ -364,8 +452,8 @@ def _constants(header: Sequence[Sequence[str]], dialect: Dialect) -> dict[str, f
         cells = [c.strip() for c in row if c.strip()]
         if len(cells) == 1 and re.match(r"[^:=]{1,40}[:=]\s*\S", cells[0]):
             key, value = re.split(r"[:=]", cells[0], maxsplit=1)
-        elif len(cells) == 2 and dialect.width != 2:
-            key, value = cells
+        elif (len(cells) == 2 and dialect.width != 2) or (len(cells) > 2 and len({*cells[1:]}) == 1):
+            key, value = cells[:2]
         elif len(cells) == 3 and is_period(f"{cells[1]} {cells[2]}"):
             key, value = cells[0], f"{cells[1]} {cells[2]}"
         else:
@@ -376,5 +464,9 @@ def _constants(header: Sequence[Sequence[str]], dialect: Dialect) -> dict[str, f
 
 
 FORMAT = Format(
-    "csv", "text (CSV, TSV, TwinCAT Scope)", (".csv", ".tsv", ".txt", ".dat", ".asc", ".log"), recognise, read
+    "csv",
+    "text (CSV, TSV, TwinCAT Scope, LabVIEW)",
+    (".csv", ".tsv", ".txt", ".dat", ".asc", ".log", ".lvm"),
+    recognise,
+    read,
 )

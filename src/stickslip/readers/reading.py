@@ -32,6 +32,7 @@ FORMATS = (
     "tdms",
     "rosbag",
     "json_samples",
+    "codesys_trace",
     "csv_text",
 )
 """One file a format, asked in this order; text is last, since anything may be text."""

@@ -36,6 +36,9 @@ ALIKE = 1.3
 """Times that the sizes in both halves of the motion may be apart for one unit to explain them."""
 FOLLOWS, LONG = 0.6, 500
 """Correlation with the position's change above which a velocity follows it; and rows that tell that it does not."""
+DEPARTS, INTEGRATES = 0.02, 0.5
+"""Part of the distance by which the position departs from a constant speed at least, to compare it with the integral of
+the velocity; and the squared correlation of both from which on the velocity belongs to the position."""
 
 
 class Size(NamedTuple):
@@ -97,6 +100,25 @@ class Compared:
     def size(self) -> float:
         """Root mean square of the column over that of the position's change."""
         return math.sqrt(float(np.mean(self.given**2) / np.mean(self.velocity**2)))
+
+    @property
+    def integrates(self) -> bool:
+        """Whether the column's integral explains most of how the position departs from a constant speed.
+
+        Noise, a delay and a filter, which change the velocity, hardly change its integral. True if the position departs
+        too little to tell.
+        """
+        times = np.linspace(-1.0, 1.0, self.given.size)
+        travel, integral = (np.cumsum(x) * self.period for x in (self.velocity, self.given))
+        even = np.stack([np.ones_like(times), times]).T
+        travel, integral = (x - even @ np.linalg.lstsq(even, x, rcond=None)[0] for x in (travel, integral))
+        own, other = float(np.sum(travel**2)), float(np.sum(integral**2))
+        if (
+            own < DEPARTS**2 * self.given.size * float(np.sum(np.abs(self.velocity)) * self.period) ** 2
+            or other == 0.0
+        ):
+            return other > 0.0
+        return float(np.sum(travel * integral)) ** 2 > INTEGRATES * own * other
 
     @property
     def alike(self) -> bool:
@@ -242,11 +264,14 @@ def velocity_scale(view: View) -> Iterator[Finding]:
     if any(x.right for x in sizes if abs(follows) > FOLLOWS or x.least > FOLLOWS * x.most):
         return
     if abs(follows) < FOLLOWS:
-        if both.given.size < LONG:
+        belongs = both.integrates
+        if both.given.size < LONG and belongs:
             return
         message = f"velocity does not follow the position (correlation {follows:.2f})"
+        if not belongs:
+            message += ", and its integral is another motion"
         remedy = "check that both belong to one axis; --map velocity=none derives it from the position"
-        yield Finding("warning", "velocity-mismatch", message, remedy=remedy)
+        yield Finding("warning" if belongs else "error", "velocity-mismatch", message, remedy=remedy)
     elif both.alike:
         yield _another_unit(abs(sizes[0].middle), view)
 
