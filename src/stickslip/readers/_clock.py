@@ -97,12 +97,17 @@ def time_of(
     if first is None:
         raise InputError(
             f"no column is known to be a channel among {_some(table)}; say which is which, "
-            "such as --map time=COLUMN:s --map position=COLUMN:deg"
+            f"such as --map time=COLUMN:s --map position=COLUMN:deg{_of_tool(table)}"
         )
     raise InputError(
         f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give "
         f"{_by_header(table)}"
     )
+
+
+def _of_tool(table: Table) -> str:
+    """What is known of the tool that wrote the table, for an error."""
+    return "".join(f"; {f.message}; {f.remedy}" for f in table.findings if f.code == "tool")
 
 
 def _by_header(table: Table) -> str:

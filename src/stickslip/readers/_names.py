@@ -19,12 +19,12 @@ from stickslip.readers._vocabulary import (
     FORCE_SYMBOL,
     LOAD_SIDE,
     MOTOR_SIDE,
+    NAMED_BY_UNIT,
     NO_SIGNAL,
     NO_TAIL,
     OF_REFERENCE,
     OTHER_COMPOUNDS,
     REFERENCED,
-    SECONDS,
     SENSOR,
     SKIP,
     WHOLE,
@@ -36,8 +36,8 @@ KINDS: dict[str, tuple[str, ...]] = {
     "position": ("angle", "length", "counts"),
     "position_reference": ("angle", "length", "counts"),
     "position_error": ("angle", "length", "counts"),
-    "velocity": ("angular velocity", "velocity", "count rate"),
-    "velocity_reference": ("angular velocity", "velocity", "count rate"),
+    "velocity": ("angular velocity", "velocity", "count rate", "electrical speed"),
+    "velocity_reference": ("angular velocity", "velocity", "count rate", "electrical speed"),
     "acceleration": ("angular acceleration", "acceleration"),
     "motor_torque": ("torque", "force", "share"),
     "friction_torque": ("torque", "force"),
@@ -163,7 +163,7 @@ def _pieces(name: str, unit: str) -> tuple[str, str, list[str], str]:
     bare, inner = _without_unit(name)
     if not unit and not inner and not _whole(bare):
         bare, inner = _without_tail(bare)
-    stated = unit or inner or (bare if bare.lower() in SECONDS else "")
+    stated = unit or inner or (bare if bare.lower() in NAMED_BY_UNIT else "")
     parts, axis = words(bare), ""
     if not _whole(bare):
         if parts and (match := re.fullmatch(r"([a-z]+)(\d{1,2})", parts[-1])):
@@ -265,6 +265,9 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
             return "", 0
         found = [role]
     role = found[0]
+    if {"motor_torque", "current"} <= set(found):
+        # The last noun counts: "torque current" is a current, "current as torque" a torque.
+        role = max(("motor_torque", "current"), key=lambda r: max(parts.index(w) for w in WORDS[r] if w in parts))
     if is_reference and role == "motor_torque":
         return role, 0
     if is_reference:
@@ -285,7 +288,7 @@ def _role_by_unit(parts: list[str], unit: Unit) -> str:
     """What an unknown name with a telling unit must be; empty where the unit tells too little."""
     if not OF_REFERENCE.isdisjoint(parts):
         return "motor_torque" if unit.kind == "torque" else ""
-    return {"angular velocity": "velocity", "torque": "motor_torque", "current": "current", "voltage": "voltage",
+    return {"angular velocity": "velocity", "electrical speed": "velocity", "torque": "motor_torque", "current": "current", "voltage": "voltage",
             "temperature": "temperature", "angle": "position", "counts": "position"}.get(unit.kind, "")  # fmt: skip
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.readers._flatten import table_of
 from stickslip.readers._names import ALIASES, KINDS
+from stickslip.readers._tool_columns import with_tool
 from stickslip.readers._units import SI, parse_unit
 from stickslip.readers.convert import LINEAR
 from stickslip.readers.table_columns import Column, Table
@@ -121,7 +122,7 @@ def table_in_memory(data: Any) -> Table:
             f"log: {with_article(type(data).__name__)} without columns of numbers is no log; give a path, a data "
             "frame, a mapping of arrays, a Record, or arrays by name (t=..., position=..., torque=...)"
         )
-    return table
+    return with_tool(table)
 
 
 def refuse_the_same_name(names: Sequence[str]) -> None:

@@ -18,8 +18,10 @@ from stickslip.errors import InputError
 from stickslip.readers import profiles
 from stickslip.readers._choose import Choice, choose, meant, parse_mapping
 from stickslip.readers._names import ROLES
+from stickslip.readers._tool_columns import with_tool
 from stickslip.readers.convert import Drive, convert, times_of
-from stickslip.readers.table_columns import Column, Format, Table
+from stickslip.readers.limits import insist_on_columns
+from stickslip.readers.table_columns import Format, Table
 from stickslip.record import Record
 
 FORMATS = (
@@ -31,6 +33,8 @@ FORMATS = (
     "mdf",
     "tdms",
     "rosbag",
+    "wpilog",
+    "ulog",
     "json_samples",
     "csv_text",
 )
@@ -80,7 +84,8 @@ def open_table(path: str | os.PathLike[str]) -> Table:
         ) from None
     if not table.columns:
         raise InputError(f"{source} holds no columns of numbers; give a file with samples over time")
-    return table
+    insist_on_columns(source, len(table.columns))
+    return with_tool(table)
 
 
 def _head(source: Path) -> bytes:
@@ -232,11 +237,10 @@ def joined(
         raise InputError(f"{source}: {error}") from None
     taken = {c.name for c in table.columns}
     columns = [
-        Column(
-            c.name if c.name not in taken else f"{c.name} ({source.name})",
-            c.values,
-            c.unit,
-            c.clock if c.clock is not None else clock + origin,
+        replace(
+            c,
+            name=c.name if c.name not in taken else f"{c.name} ({source.name})",
+            clock=c.clock if c.clock is not None else clock + origin,
         )
         for c in other.columns
         if c.name != named and (c.clock is not None or c.values.size == clock.size)
