@@ -40,6 +40,8 @@ RATES = (
 
 COUNTERS, NEAR = (16, 24, 32), 4.0
 """Bits of a counter of times, and steps by which it may miss the place where it would go on."""
+LONGEST_NAME = 60
+"""Letters of a column's name that an error quotes."""
 SAME = 0.01
 """Part of a stated period by which a column of times may differ from it without a word."""
 
@@ -137,6 +139,7 @@ def times_of(table: Table, choices: Sequence[Choice], sample_time: float | None)
 
 def _some(table: Table) -> str:
     names = [c.name or "one without a name" for c in table.columns]
+    names = [name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..." for name in names]
     return ", ".join(names[:12]) + (", ..." if len(names) > 12 else "") if names else "none at all"
 
 

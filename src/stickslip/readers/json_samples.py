@@ -34,7 +34,7 @@ def read(path: Path) -> Table:
         parts = cast("Mapping[str, Any]", tree)
         if isinstance(parts.get("columns"), list) and isinstance(parts.get("data"), list):
             tree = _split(parts)
-    return table_of("json", tree)
+    return table_of("json", tree, path)
 
 
 def _parse(path: Path, text: str) -> Any:

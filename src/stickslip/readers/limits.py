@@ -11,7 +11,7 @@ from pathlib import Path
 from stickslip.capacity import free_memory, size_text
 from stickslip.errors import InputError
 
-MAX_COLUMNS = 10_000
+MAX_COLUMNS = 5_000
 """Columns of a file: a car's measurement file has a few thousand channels."""
 LONGEST_LINE = 32 * MAX_COLUMNS
 """Characters of a line of text: `MAX_COLUMNS` numbers with all their digits and delimiters."""
@@ -25,6 +25,15 @@ def memory_for(size: int) -> int:
     A text of numbers takes about four times its size while it is read and examined; a short one next to nothing.
     """
     return 900 * 2**20 + 12 * size
+
+
+def too_large(path: Path) -> InputError:
+    """The error of a file that takes more memory than `memory_for` while it is read, whatever it declares."""
+    size = size_of(path)
+    return InputError(
+        f"{path} has {size_text(size)} and needs more than {size_text(memory_for(size))} of memory to read; save it "
+        "without compression, or export only the signals and the rows that you need"
+    )
 
 
 def size_of(path: Path) -> int:

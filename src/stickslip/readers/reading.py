@@ -13,6 +13,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from stickslip.capacity import insist_on_memory, size_text
 from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.readers import profiles
@@ -20,7 +21,7 @@ from stickslip.readers._choose import Choice, choose, meant, parse_mapping
 from stickslip.readers._names import ROLES
 from stickslip.readers._tool_columns import with_tool
 from stickslip.readers.convert import Drive, convert, times_of
-from stickslip.readers.limits import insist_on_columns
+from stickslip.readers.limits import insist_on_columns, size_of
 from stickslip.readers.table_columns import Format, Table
 from stickslip.record import Record
 
@@ -39,6 +40,8 @@ FORMATS = (
     "csv_text",
 )
 """One file a format, asked in this order; text is last, since anything may be text."""
+TIMES_OF_A_TEXT = 4.0
+"""Memory that a text of numbers takes while it is read, in times its size."""
 CHANNELS = ROLES
 """What the columns of a file may be."""
 PER_MILLE = re.compile(r"(?i)(?<![0-9a-f])60(?:77|b2)(?![0-9a-f])")
@@ -74,6 +77,8 @@ def open_table(path: str | os.PathLike[str]) -> Table:
                 raise InputError(f"{source} is a folder, and no ROS bag; give a file in it")
             titles = ", ".join(f.title for f in known)
             raise InputError(f"{source} is in no format that is known; formats are {titles}")
+        size = size_of(source)
+        insist_on_memory(TIMES_OF_A_TEXT * size, f"{source}: {size_text(size)}", "read a part of it")
         with np.errstate(all="ignore"):
             table = found.read(source)
     except FileNotFoundError:
