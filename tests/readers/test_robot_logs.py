@@ -176,8 +176,8 @@ def write_sysid(path: Path, absolute: bool = False, width: int = 4) -> None:
 def test_sysid_tests_identify_a_motor_by_its_voltage(tmp_path, absolute):
     write_sysid(tmp_path / "a.json", absolute)
     found = ss.identify("a.json", resistance=RESISTANCE, torque_constant=CONSTANT)
-    assert found.values["fc"] == pytest.approx(0.1, rel=0.05)
-    assert found.inertia == pytest.approx(2e-3, rel=0.05)
+    assert found["fc"].value == pytest.approx(0.1, rel=0.05)
+    assert found["inertia"].value == pytest.approx(2e-3, rel=0.05)
     codes = {f["code"] for f in read("a.json").meta["reading"]["findings"]}
     assert ("sysid-sign" in codes) == absolute
 
