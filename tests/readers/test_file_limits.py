@@ -1,4 +1,4 @@
-"""Small files that unpack to more than memory, and files with more columns than any log: refused before they are read."""
+"""Files that unpack to more than memory, or have more columns than any log: refused before they are read."""
 
 from __future__ import annotations
 
@@ -186,3 +186,16 @@ def test_data_in_other_files_is_left_out_and_reported(tmp_path):
     said = [f.message for f in table.findings]
     assert all(any(repr(name) in text for text in said) for name in ("link", "raw", "virtual"))
     assert len(said) == 3
+
+
+@pytest.mark.parametrize("kind", ["path", "link"])
+def test_a_bag_with_a_file_outside_its_folder_is_refused(tmp_path, kind):
+    (tmp_path / "other.db3").write_bytes(b"SQLite format 3\0")
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    named = "../other.db3" if kind == "path" else "bag.db3"
+    (bag / "metadata.yaml").write_text(f"rosbag2_bagfile_information:\n  relative_file_paths:\n  - {named}\n")
+    if kind == "link":
+        (bag / "bag.db3").symlink_to(tmp_path / "other.db3")
+    with pytest.raises(InputError, match=rf"{named}' is outside its folder"):
+        open_table(bag)

@@ -88,7 +88,9 @@ def test_only_the_time_may_be_dates() -> None:
         ss.read(t=T, position=NOW, torque=LOG["torque"])
 
 
-@pytest.mark.parametrize("thing", [np.array(None), np.array(1.0), np.array("text"), np.array((1.0, 2.0), "f8,f8")])
+@pytest.mark.parametrize(
+    "thing", [np.array(None), np.array(1.0), np.array("text"), np.array((1.0, 2.0), "f8,f8")]
+)
 def test_an_array_without_rows_is_no_log(thing: Any) -> None:
     for call in (ss.read, ss.doctor, ss.identify):
         with pytest.raises(ss.InputError, match="log"):

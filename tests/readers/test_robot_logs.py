@@ -85,7 +85,12 @@ def arm() -> Entries:
         ("enabled", "boolean", "", [(t + 1.0, b"\1") for t in T[::50]]),
         ("module", "int64[]", "", [(t + 1.0, struct.pack("<2q", 1, -2)) for t in T[::50]]),
         ("/pose", "struct:Pose2d", "", [(t + 1.0, struct.pack("<dd3if", 1, 2, 3, 4, 5, 6)) for t in T[::50]]),
-        ("/.schema/struct:Pose2d", "structschema", "", [(0.5, b"Translation2d t;enum{a=1} int32 n[3]; float h")]),
+        (
+            "/.schema/struct:Pose2d",
+            "structschema",
+            "",
+            [(0.5, b"Translation2d t;enum{a=1} int32 n[3]; float h")],
+        ),
         ("/.schema/struct:Translation2d", "structschema", "", [(0.5, b"double x;double y")]),
     ]
 
@@ -132,18 +137,22 @@ def test_a_wpilog_that_is_cut_off_gives_what_it_has(tmp_path, part):
     write_wpilog(tmp_path / "a.wpilog", arm())
     whole = (tmp_path / "a.wpilog").read_bytes()
     (tmp_path / "a.wpilog").write_bytes(whole[: int(part * len(whole))])
-    try:
-        table = open_table("a.wpilog")
-    except InputError as error:
-        assert "a.wpilog" in str(error)
+    if part < 0.05:  # within the names of the entries
+        with pytest.raises(InputError, match=r"a\.wpilog"):
+            open_table("a.wpilog")
     else:
-        assert any(f.code == "cut-off" for f in table.findings)
+        assert any(f.code == "cut-off" for f in open_table("a.wpilog").findings)
 
 
 # ---- SysId --------------------------------------------------------------------------------------------------
 
 RESISTANCE, CONSTANT = 0.2, 0.05
-TESTS = {"slow-forward": (1, 0.0), "slow-backward": (-1, 20.0), "fast-forward": (1, 40.0), "fast-backward": (-1, 60.0)}
+TESTS = {
+    "slow-forward": (1, 0.0),
+    "slow-backward": (-1, 20.0),
+    "fast-forward": (1, 40.0),
+    "fast-backward": (-1, 60.0),
+}
 
 
 def sysid_rows(name: str, absolute: bool = False) -> list[list[float]]:
@@ -154,7 +163,9 @@ def sysid_rows(name: str, absolute: bool = False) -> list[list[float]]:
     for k in range(500):
         t = 0.005 * k
         voltage = sign * (0.5 + 1.6 * t if name.startswith("slow") else 4.0)
-        rows.append([start + t, abs(voltage) if absolute else voltage, position / (2 * np.pi), speed / (2 * np.pi)])
+        rows.append(
+            [start + t, abs(voltage) if absolute else voltage, position / (2 * np.pi), speed / (2 * np.pi)]
+        )
         for _ in range(20):
             torque = CONSTANT * (voltage - CONSTANT * speed) / RESISTANCE
             speed += 0.00025 * (torque - 0.1 * np.tanh(speed / 0.01) - 0.002 * speed) / 2e-3
@@ -165,7 +176,10 @@ def sysid_rows(name: str, absolute: bool = False) -> list[list[float]]:
 def write_sysid(path: Path, absolute: bool = False, width: int = 4) -> None:
     tests = {name: sysid_rows(name, absolute) for name in TESTS}
     if width == 9:
-        tests = {n: [[r[0], r[1], r[1], r[2], r[2], r[3], r[3], 0.0, 0.0] for r in rows] for n, rows in tests.items()}
+        tests = {
+            n: [[r[0], r[1], r[1], r[2], r[2], r[3], r[3], 0.0, 0.0] for r in rows]
+            for n, rows in tests.items()
+        }
     if width == 10:
         tests = {n: [[r[0], 12.0, 0.1, r[1], r[1], r[2], r[2], r[3], r[3], 0.0] for r in rows]
                  for n, rows in tests.items()}  # fmt: skip
@@ -193,7 +207,9 @@ def test_the_side_of_a_drivetrain_is_the_users_choice(tmp_path, capsys, width):
 
 
 def test_a_test_that_is_no_table_is_refused(tmp_path):
-    (tmp_path / "a.json").write_text(json.dumps({"slow-forward": [[1, 2, 3]], "slow-backward": [[1, 2, 3, 4]]}))
+    (tmp_path / "a.json").write_text(
+        json.dumps({"slow-forward": [[1, 2, 3]], "slow-backward": [[1, 2, 3, 4]]})
+    )
     with pytest.raises(InputError, match="'slow-forward' is no table of numbers with 4, 9 or 10 columns"):
         read("a.json")
 

@@ -56,7 +56,9 @@ class _Layout:
             self._lay_out(name, value, depth)
             return
         if id(value) in self._within:
-            raise InputError(f"{self._source or 'log'}: {name!r} contains itself; give columns of plain numbers")
+            raise InputError(
+                f"{self._source or 'log'}: {name!r} contains itself; give columns of plain numbers"
+            )
         self._within.add(id(value))
         try:
             self._lay_out(name, value, depth)

@@ -61,7 +61,7 @@ def call(function: Callable[..., T], *arguments: Any, limit: float, memory: int 
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise Died(f"found no end in {limit:.0f} s") from None
+        raise Died(f"timed out after {limit:.0f} s") from None
     if done.returncode != 0:
         said = done.stderr.decode("utf-8", "replace").strip().rsplit("\n", 1)[-1]
         raise Died(f"crashed, exit code {done.returncode}{': ' + said if said else ''}")

@@ -267,7 +267,9 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
     role = found[0]
     if {"motor_torque", "current"} <= set(found):
         # The last noun counts: "torque current" is a current, "current as torque" a torque.
-        role = max(("motor_torque", "current"), key=lambda r: max(parts.index(w) for w in WORDS[r] if w in parts))
+        role = max(
+            ("motor_torque", "current"), key=lambda r: max(parts.index(w) for w in WORDS[r] if w in parts)
+        )
     if is_reference and role == "motor_torque":
         return role, 0
     if is_reference:
@@ -288,7 +290,8 @@ def _role_by_unit(parts: list[str], unit: Unit) -> str:
     """What an unknown name with a telling unit must be; empty where the unit tells too little."""
     if not OF_REFERENCE.isdisjoint(parts):
         return "motor_torque" if unit.kind == "torque" else ""
-    return {"angular velocity": "velocity", "electrical speed": "velocity", "torque": "motor_torque", "current": "current", "voltage": "voltage",
+    return {"angular velocity": "velocity", "electrical speed": "velocity", "torque": "motor_torque",
+            "current": "current", "voltage": "voltage",
             "temperature": "temperature", "angle": "position", "counts": "position"}.get(unit.kind, "")  # fmt: skip
 
 

@@ -83,12 +83,14 @@ def table_of_tests(path: Path, tree: Mapping[str, Any]) -> Table:
     constants: dict[str, float | str] = {
         key: float(value) if isinstance(value, (int, float)) else value
         for key, value in tree.items()
-        if isinstance(value, (str, int, float)) and abs(value if isinstance(value, (int, float)) else 0) < 1e300
+        if isinstance(value, (str, int, float))
+        and abs(value if isinstance(value, (int, float)) else 0) < 1e300
     }
     return Table("sysid", columns, constants, tuple(findings), runs=tuple(starts.tolist()))
 
 
 def _rows(path: Path, name: str, given: Sequence[Any]) -> Array:
+    rows: Array
     try:
         rows = np.asarray(given, dtype=np.float64)
     except (ValueError, TypeError, OverflowError):
@@ -107,7 +109,10 @@ def _with_signed_voltages(tests: dict[str, Array], names: Sequence[str]) -> list
         for name in names:
             if not name.endswith("voltage") or name.replace("voltage", "velocity") not in names:
                 continue
-            voltage, velocity = rows[:, names.index(name)], rows[:, names.index(name.replace("voltage", "velocity"))]
+            voltage, velocity = (
+                rows[:, names.index(name)],
+                rows[:, names.index(name.replace("voltage", "velocity"))],
+            )
             if np.nansum(voltage * velocity) < 0.0:
                 voltage *= -1.0
                 inverted.append(f"{name} of {test}")
@@ -117,4 +122,6 @@ def _with_signed_voltages(tests: dict[str, Array], names: Sequence[str]) -> list
         f"{', '.join(inverted)}: the sign was inverted, since the voltage has the opposite sign of the velocity, and a "
         "motor that is tested drives"
     )
-    return [Finding("warning", "sysid-sign", message, remedy="record the voltage with its sign if this is wrong")]
+    return [
+        Finding("warning", "sysid-sign", message, remedy="record the voltage with its sign if this is wrong")
+    ]

@@ -73,7 +73,11 @@ TOOLS = (
             (f"target_qd{JOINT}", "velocity_reference", "rad/s"),
             (f"target_current{JOINT}", "current_reference", "A"),
             (f"joint_temperatures{JOINT}", "temperature", "degC"),
-            ("(actual|target|joint|tool|speed|payload|tcp|ft|output|input|robot|safety|runtime|io)_.*", "none", ""),
+            (
+                "(actual|target|joint|tool|speed|payload|tcp|ft|output|input|robot|safety|runtime|io)_.*",
+                "none",
+                "",
+            ),
             ("(TCP|elbow|standard|configurable|euromap|momentum).*", "none", ""),
         ),
         (
@@ -92,8 +96,9 @@ TOOLS = (
         (
             (
                 r"observation\.state.*",
-                "a dataset states no units (degrees, radians or percent of a joint's range, by robot and calibration), and "
-                "an action may be a position, a velocity or a difference: none of them is taken as a channel",
+                "a dataset states no units (degrees, radians or percent of a joint's range, by robot and "
+                "calibration), and an action may be a position, a velocity or a difference: none of them is taken as a "
+                "channel",
                 "map one joint with its units, such as --map 'position=observation.state[0]:deg'; for friction the "
                 "dataset needs a torque or a current too, such as --map 'torque=observation.effort[0]:Nm'",
             ),

@@ -221,7 +221,9 @@ def _scale(choice: Choice, unit: Unit, drive: Drive) -> tuple[float, str, list[s
         kind = "angle" if kind == "counts" else "angular velocity"
         steps.append(f"2π / {per_rev:g} counts")
     elif kind == "electrical speed":
-        pairs = _needed(drive.pole_pairs, choice, "electrical revolutions per minute (eRPM)", "--pole-pairs N")
+        pairs = _needed(
+            drive.pole_pairs, choice, "electrical revolutions per minute (eRPM)", "--pole-pairs N"
+        )
         factor, kind = factor / pairs, "angular velocity"
         steps.append(f"{pairs:g} pole pairs")
     elif kind == "share" and choice.role in ("motor_torque", "compensation_torque"):

@@ -127,7 +127,8 @@ def pieces(record: Record) -> tuple[list[Record], list[Finding]]:
         If no piece is long enough.
     """
     rows = file_rows(record)
-    runs = np.searchsorted(record.meta.get("reading", {}).get("runs", []), rows, side="right")
+    starts: list[int] = record.meta.get("reading", {}).get("runs", [])
+    runs: Any = np.searchsorted(np.array(starts, dtype=np.int64), rows, side="right")
     holes = np.flatnonzero((np.diff(rows) > BRIDGED + 1) | (np.diff(runs) != 0)) + 1
     if not holes.size:
         return [record], []

@@ -38,7 +38,12 @@ def read_tree(path: Path, format_name: str, matlab: bool) -> Table:
     """Read the groups of an HDF5 file; `matlab` says that strings are stored as numbers."""
     try:
         return _guard.call(
-            _read_here, path, format_name, matlab, limit=_guard.patience(path), memory=memory_for(size_of(path))
+            _read_here,
+            path,
+            format_name,
+            matlab,
+            limit=_guard.patience(path),
+            memory=memory_for(size_of(path)),
         )
     except MemoryError:
         raise too_large(path) from None

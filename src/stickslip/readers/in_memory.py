@@ -92,7 +92,9 @@ def numbers_of(name: str, values: Any, dates: bool = False) -> Array:
         raise InputError(f"{name} has a number beyond 1.8e308, which no signal has; correct it") from None
     except (TypeError, ValueError):
         pass
-    kind = "of dates, which only the time may be" if _are_dates(values) and not dates else "no array of numbers"
+    kind = (
+        "of dates, which only the time may be" if _are_dates(values) and not dates else "no array of numbers"
+    )
     raise InputError(f"{name} is {kind}; give one number a sample")
 
 
@@ -212,7 +214,8 @@ def array_of(column: Any) -> Any:
 def _plain(values: Any) -> Any:
     """Arrays of whatever library as NumPy's, dates in s since 1970; anything else as it is."""
     if not hasattr(values, "__array__"):
-        dated = isinstance(values, list) and bool(values) and isinstance(values[0], (datetime, np.datetime64))
+        first: Any = next(iter(cast("list[Any]", values)), None) if isinstance(values, list) else None
+        dated = isinstance(first, (datetime, np.datetime64))
         return _seconds(with_dates(values), np.datetime64(0, "s")) if dated else values
     numbers = with_dates(values)
     return _seconds(numbers, np.datetime64(0, "s")) if numbers.dtype.kind == "M" else numbers

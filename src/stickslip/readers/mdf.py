@@ -27,9 +27,7 @@ def read(path: Path) -> Table:
     """Every channel of numbers with its unit and the clock of its group."""
     needed("asammdf", "mdf", "MDF files need")
     try:
-        return _guard.call(
-            _read_here, path, limit=_guard.patience(path), memory=memory_for(size_of(path))
-        )
+        return _guard.call(_read_here, path, limit=_guard.patience(path), memory=memory_for(size_of(path)))
     except MemoryError:
         raise too_large(path) from None
     except _guard.Died as error:

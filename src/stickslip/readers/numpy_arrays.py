@@ -14,7 +14,6 @@ from stickslip.readers._flatten import table_of
 from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Format, Table
 
-
 NPY = b"\x93NUMPY"
 
 

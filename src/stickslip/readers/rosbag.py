@@ -35,13 +35,11 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """The numeric fields of every topic, with their clock."""
-    needed("rosbags.highlevel", "rosbag", "ROS bags need")
     if path.is_dir():
         _insist_on_own_files(path)
+    needed("rosbags.highlevel", "rosbag", "ROS bags need")
     try:
-        return _guard.call(
-            _read_here, path, limit=_guard.patience(path), memory=memory_for(size_of(path))
-        )
+        return _guard.call(_read_here, path, limit=_guard.patience(path), memory=memory_for(size_of(path)))
     except MemoryError:
         raise too_large(path) from None
     except _guard.Died as error:

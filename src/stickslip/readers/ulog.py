@@ -70,7 +70,9 @@ def read(path: Path) -> Table:
         "taken as a channel by its name"
     )
     remedy = "map the fields of one axis, such as --map velocity=esc_status.esc[0].esc_rpm:rpm"
-    return Table("ulog", tuple(columns), constants, (Finding("note", "tool", message, remedy=remedy), *findings))
+    return Table(
+        "ulog", tuple(columns), constants, (Finding("note", "tool", message, remedy=remedy), *findings)
+    )
 
 
 def _topics(content: bytes) -> tuple[list[_Topic], dict[str, float | str], list[Finding]]:

@@ -29,7 +29,9 @@ FIELDS = {
     "bool": "?", "int8": "i1", "int16": "<i2", "int32": "<i4", "int64": "<i8", "uint8": "u1", "uint16": "<u2",
     "uint32": "<u4", "uint64": "<u8", "float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8",
 }  # fmt: skip
-DECLARATION = re.compile(r"(?:(?:enum\s*)?\{[^}]*\}\s*)?([^\s\[\]:;]+)\s+([^\s\[\]:;]+)\s*(?:\[\s*(\d+)\s*\])?")
+DECLARATION = re.compile(
+    r"(?:(?:enum\s*)?\{[^}]*\}\s*)?([^\s\[\]:;]+)\s+([^\s\[\]:;]+)\s*(?:\[\s*(\d+)\s*\])?"
+)
 """One member of a struct; a bit field, which has a colon, does not match."""
 SCHEMA = "/.schema/struct:"
 DEPTH = 8
@@ -73,7 +75,9 @@ def read(path: Path) -> Table:
         entries, cut = _entries(content)
     except Damaged as error:
         raise InputError(f"{path} is not a WPILib log that can be read: {error}; download it again") from None
-    findings = [Finding("warning", "cut-off", cut, remedy="download it again if it was copied")] if cut else []
+    findings = (
+        [Finding("warning", "cut-off", cut, remedy="download it again if it was copied")] if cut else []
+    )
     schemas = {e.name.removeprefix(SCHEMA): _text(e.samples[-1]) for e in entries
                if e.name.startswith(SCHEMA) and e.samples}  # fmt: skip
     columns: list[Column] = []
@@ -85,10 +89,14 @@ def read(path: Path) -> Table:
         columns += made
         insist_on_columns(path, len(columns))
         if not made:
-            unread[entry.name] = _text(entry.samples[0])[:30] if entry.kind in ("string", "json") else entry.kind
+            unread[entry.name] = (
+                _text(entry.samples[0])[:30] if entry.kind in ("string", "json") else entry.kind
+            )
     if unread:
         names = ", ".join(repr(name) for name in list(unread)[:4]) + (", ..." if len(unread) > 4 else "")
-        message = f"{len(unread)} entries hold no numbers, or arrays of changing length, and were left out: {names}"
+        message = (
+            f"{len(unread)} entries hold no numbers, or arrays of changing length, and were left out: {names}"
+        )
         findings.append(Finding("note", "not-read", message))
     return Table("wpilog", tuple(columns), findings=tuple(findings), unread=unread)
 
@@ -181,7 +189,7 @@ def _columns(entry: _Entry, schemas: dict[str, str]) -> list[Column]:
     if not members or layout.itemsize not in sizes:
         return []
     order = np.argsort(np.array(entry.times, dtype=np.int64), kind="stable")
-    clock = np.array(entry.times, dtype=np.int64)[order] * 1e-6
+    clock = 1e-6 * np.array(entry.times, dtype=np.float64)[order]
     rows = np.frombuffer(b"".join(entry.samples), dtype=layout)[order]
     unit = _unit(entry.metadata)
     # Poses and speeds of the robot: an x of a struct is no position of an axis.
