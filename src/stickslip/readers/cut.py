@@ -128,8 +128,9 @@ def pieces(record: Record) -> tuple[list[Record], list[Finding]]:
     """
     rows = file_rows(record)
     starts: list[int] = record.meta.get("reading", {}).get("runs", [])
-    runs: Any = np.searchsorted(np.array(starts, dtype=np.int64), rows, side="right")
-    holes = np.flatnonzero((np.diff(rows) > BRIDGED + 1) | (np.diff(runs) != 0)) + 1
+    numpy: Any = np
+    runs = numpy.searchsorted(starts, rows, side="right")
+    holes = numpy.flatnonzero((np.diff(rows) > BRIDGED + 1) | (numpy.diff(runs) != 0)) + 1
     if not holes.size:
         return [record], []
     index = np.arange(len(record))

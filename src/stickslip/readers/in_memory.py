@@ -216,7 +216,7 @@ def _plain(values: Any) -> Any:
     if not hasattr(values, "__array__"):
         first: Any = next(iter(cast("list[Any]", values)), None) if isinstance(values, list) else None
         dated = isinstance(first, (datetime, np.datetime64))
-        return _seconds(with_dates(values), np.datetime64(0, "s")) if dated else values
+        return _seconds(with_dates(values), np.datetime64(0, "s")) if dated else cast("Any", values)
     numbers = with_dates(values)
     return _seconds(numbers, np.datetime64(0, "s")) if numbers.dtype.kind == "M" else numbers
 
