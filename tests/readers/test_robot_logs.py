@@ -132,6 +132,12 @@ def test_the_torque_producing_current_is_a_current(tmp_path, capsys):
     assert "there is current but no torque; give --torque-constant" in said
 
 
+def test_the_current_of_the_supply_is_not_the_motors(tmp_path):
+    entries = [(n.replace("current-motor-arm", "SupplyCurrent"), k, "", s) for n, k, _, s in arm()]
+    write_wpilog(tmp_path / "a.wpilog", entries)
+    assert set(read("a.wpilog").channels) == {"position", "velocity"}
+
+
 @pytest.mark.parametrize("part", [0.02, 0.3, 0.999])
 def test_a_wpilog_that_is_cut_off_gives_what_it_has(tmp_path, part):
     write_wpilog(tmp_path / "a.wpilog", arm())
@@ -397,3 +403,32 @@ def test_lists_of_different_lengths_are_left_out(tmp_path):
         "column 'x' holds lists of different lengths; it was left out",
         "column 'n' holds string, not numbers; it was left out",
     ]
+
+
+# ---- damage -------------------------------------------------------------------------------------------------
+
+
+def write_arm(path: Path) -> None:
+    write_wpilog(path, arm())
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [("a.wpilog", write_arm), ("a.ulg", write_ulog), ("a.json", write_sysid), ("a.parquet", write_lerobot)],
+    ids=["wpilog", "ulog", "sysid", "lerobot"],
+)
+def test_a_damaged_file_gets_one_line(tmp_path, name, write):
+    write(tmp_path / name)
+    whole = (tmp_path / name).read_bytes()
+    rng = np.random.default_rng(50)
+    for _ in range(60):
+        data = bytearray(whole)
+        for at in rng.integers(0, len(data), rng.integers(1, 6)):
+            near = int(at) if rng.random() < 0.5 else int(at) % 2000  # headers are at the start
+            data[near : near + int(rng.integers(1, 9))] = rng.bytes(int(rng.integers(0, 9)))
+        (tmp_path / name).write_bytes(data)
+        try:
+            read(name)
+        except InputError as error:
+            said = str(error)
+            assert "\n" not in said

@@ -235,6 +235,8 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
         return "sensor_torque", 1
     if "load" in found and len(found) > 1:
         found.remove("load")  # "load position" is a position on the load's side
+    if {"supply", "current"} <= set(found):
+        return "", 0  # the supply's current is not the motor's
     for one in ("friction_torque", "supply"):
         if one in found:
             found = [one]

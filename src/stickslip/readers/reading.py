@@ -81,6 +81,11 @@ def open_table(path: str | os.PathLike[str]) -> Table:
         insist_on_memory(TIMES_OF_A_TEXT * size, f"{source}: {size_text(size)}", "read a part of it")
         with np.errstate(all="ignore"):
             table = found.read(source)
+    except InputError as error:
+        if "\n" not in str(error):
+            raise
+        # Some libraries describe a damaged file in several lines.
+        raise InputError(" ".join(str(error).split())) from None
     except FileNotFoundError:
         raise InputError(f"no file {source}; check the path") from None
     except (OSError, MemoryError) as error:
