@@ -46,6 +46,21 @@ def insist_on_memory(needed: float, what: str, remedy: str = "ask for less") -> 
         raise InputError(f"{what} need {size_text(needed)} of memory, {size_text(free)} are free; {remedy}")
 
 
+def limit_memory(most: int) -> None:
+    """Let this process hold that many bytes; where the system cannot, nothing is limited.
+
+    What counts is memory that can be written: libraries reserve addresses far beyond what they ever use.
+    """
+    try:
+        import resource
+    except ModuleNotFoundError:  # Windows
+        return
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+    resource.setrlimit(
+        resource.RLIMIT_DATA, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard)
+    )
+
+
 def insist_on_jobs(jobs: int) -> None:
     """Refuse numbers of workers that are none, or so many that starting them takes longer than the work.
 
@@ -80,7 +95,7 @@ def size_text(size: float) -> str:
     if not math.isfinite(size):
         return "more than any number of bytes"
     for unit in ("B", "kB", "MB", "GB", "TB", "PB"):
-        if size < 1000.0 or unit == "PB":
+        if size < 999.5 or unit == "PB":
             return f"{size:.3g} {unit}"
         size /= 1000.0
     raise AssertionError

@@ -53,6 +53,93 @@ def test_masked_dates_and_points_are_missing() -> None:
         ss.Reference.table(T, np.ma.MaskedArray(LOG["position"], mask=T[3] == T))
 
 
+NOW = pandas.date_range("2024-01-01", periods=T.size, freq="ms")
+DATES = {
+    "datetime64[ns]": NOW.to_numpy(),
+    "datetime64[us]": NOW.to_numpy().astype("datetime64[us]"),
+    "index": NOW,
+    "series": pandas.Series(NOW),
+    "time zone": pandas.Series(NOW).dt.tz_localize("Europe/Vienna"),
+    "objects": np.array(list(NOW), dtype=object),
+    "datetime": [date.to_pydatetime() for date in NOW],
+    "list of datetime64": list(NOW.to_numpy()),
+    "texts": NOW.astype(str).to_numpy(),
+    "timedelta64": NOW.to_numpy() - NOW.to_numpy()[0],
+}
+
+
+@pytest.mark.parametrize("kind", DATES)
+@pytest.mark.parametrize("given", ["arrays", "mapping", "frame"])
+def test_dates_of_every_kind_are_times(kind: str, given: str) -> None:
+    dates: Any = DATES[kind]
+    if given == "arrays" and kind == "texts":
+        pytest.skip("arrays by name are numbers or dates")
+    signals = {"position": LOG["position"], "torque": LOG["torque"]}
+    table: Any = {"time": dates, **signals, "other": T}
+    read = ss.read(t=dates, **signals) if given == "arrays" else ss.read(
+        table if given == "mapping" else pandas.DataFrame(table)
+    )  # fmt: skip
+    assert np.allclose(read.time - read.time[0], T, atol=1e-6)
+    assert ss.doctor(read).errors == ()
+
+
+def test_only_the_time_may_be_dates() -> None:
+    with pytest.raises(ss.InputError, match="position is of dates, which only the time may be"):
+        ss.read(t=T, position=NOW, torque=LOG["torque"])
+
+
+@pytest.mark.parametrize(
+    "thing", [np.array(None), np.array(1.0), np.array("text"), np.array((1.0, 2.0), "f8,f8")]
+)
+def test_an_array_without_rows_is_no_log(thing: Any) -> None:
+    for call in (ss.read, ss.doctor, ss.identify):
+        with pytest.raises(ss.InputError, match="log"):
+            call(thing)
+    for name in ("t", "position", "torque"):
+        with pytest.raises(ss.InputError, match=name):
+            ss.read(**{**LOG, name: thing})
+
+
+def test_an_array_around_a_mapping_is_that_mapping() -> None:
+    assert len(ss.read(np.array(dict(LOG), dtype=object))) == T.size
+
+
+def test_a_number_that_no_float_holds_is_infinite_or_refused() -> None:
+    large = [10**400, *LOG["position"][1:]]
+    with pytest.raises(ss.InputError, match="position has a number beyond"):
+        ss.read(**{**LOG, "position": large})
+    found = ss.doctor({**LOG, "position": large, "other": T}).findings
+    assert any(f.code == "nan" and f.message.startswith("position has 1 ") for f in found)
+
+
+def of_itself(kind: str) -> Any:
+    mapping: dict[str, Any] = {"a": 1.0}
+    mapping["b"] = mapping
+    items: list[Any] = [1.0]
+    items.append(items)
+    array: Any = np.array([1.0, None], dtype=object)
+    array[1] = array
+    return {"mapping": mapping, "list": items, "array": array, "samples": [{"t": 0.0, "x": mapping}]}[kind]
+
+
+@pytest.mark.parametrize("kind", ["mapping", "list", "array", "samples"])
+def test_what_contains_itself_is_refused(kind: str) -> None:
+    whole = [of_itself(kind)] if kind != "array" else []  # an array has no names
+    for data in (*whole, {"time": T, "q": LOG["position"], "tau": of_itself(kind)}):
+        with pytest.raises(ss.InputError, match="contains itself"):
+            ss.doctor(data)
+    with pytest.raises(ss.InputError, match="position"):
+        ss.read(t=T, position=of_itself(kind), torque=LOG["torque"])
+
+
+def test_containers_in_containers_come_to_an_end() -> None:
+    wide: Any = [1.0, "x"]
+    for _ in range(10):
+        wide = [wide] * 60
+    with pytest.raises(ss.InputError, match="at most"):
+        ss.read({"time": T, "q": wide})
+
+
 @pytest.mark.parametrize("zone", [None, "Europe/Vienna"])
 def test_an_index_of_dates_needs_no_name(zone: str | None) -> None:
     index = pandas.date_range("2024-01-01", periods=T.size, freq="ms", tz=zone)

@@ -40,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser, *, part: bool = False) -> Non
         ("--rated-current", "A", "rated current, for currents in percent or per mille"),
         ("--torque-constant", "NM_PER_A", "torque per current"),
         ("--force-constant", "N_PER_A", "force per current of a linear motor"),
+        ("--pole-pairs", "N", "pole pairs of the motor, for speeds in eRPM"),
         ("--gear-ratio", "N", "motor revolutions per load revolution"),
         ("--lead", "MM", "travel of a linear axis per revolution of screw, pinion or pulley"),
     ):
@@ -103,7 +104,7 @@ def reading_of(args: argparse.Namespace) -> Reading:
         "side": args.side, "lead": None if args.lead is None else 1e-3 * args.lead,
         "counts_per_rev": args.counts_per_rev, "rated_torque": args.rated_torque, "gear_ratio": args.gear_ratio,
         "rated_current": args.rated_current, "torque_constant": args.torque_constant,
-        "force_constant": args.force_constant,
+        "force_constant": args.force_constant, "pole_pairs": args.pole_pairs,
     }  # fmt: skip
     if "leave_out" in args:
         out |= {

@@ -15,6 +15,8 @@ from stickslip.readers.table_columns import Column, Table
 
 MOTION = ("position", "velocity")
 """Channels that say whether the axis turns or moves along a line."""
+DEFINED = 3
+"""`Name.sure` of a column whose format defines its channel."""
 AMBIGUOUS = {"grad": "is a degree in German and a gradian in English; say deg, or 0.9 deg for gradians"}
 """Units that a file may have, and nobody should say."""
 
@@ -94,7 +96,7 @@ def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list
     mapping = meant(table, mapping)
     chosen = {role: _explicit(table, role, text) for role, text in mapping.items() if text.lower() != "none"}
     taken = {choice.column for choice in chosen.values()}
-    names = with_rates(table.columns, {c.name: role_of(c.name, _unit_of(c)) for c in table.columns})
+    names = with_rates(table.columns, {c.name: _name_of(c) for c in table.columns})
     joints = Joints(names)
     findings = joints.take([(role, choice.column) for role, choice in chosen.items()])
     for role in ROLES:
@@ -102,7 +104,11 @@ def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list
             continue
         candidates = [c for c in table.columns if c.name not in taken and names[c.name].role == role]
         if role == "motor_torque" and not candidates and _along_a_line(chosen):
-            forces = {c.name: read for c in table.columns if (read := motor_force(c.name, _unit_of(c)))}
+            forces = {
+                c.name: read
+                for c in table.columns
+                if not c.channel and (read := motor_force(c.name, _unit_of(c)))
+            }
             names |= forces
             candidates = [c for c in table.columns if c.name in forces and c.name not in taken]
         candidates, found = joints.of_one_axis(role, candidates)
@@ -201,6 +207,15 @@ def _absent(table: Table, name: str) -> str:
 def _unit_of(column: Column) -> str:
     """The unit that the file gives beside the name, where it is one."""
     return column.unit if may_be_unit(column.unit) else ""
+
+
+def _name_of(column: Column) -> Name:
+    """What a column is: as its format defines it, else as its name and unit indicate."""
+    read = role_of(column.name, _unit_of(column))
+    if not column.channel:
+        return read
+    channel = "" if column.channel == "none" else column.channel
+    return Name(channel, DEFINED, read.unit, read.axis, read.side)
 
 
 def _along_a_line(chosen: Mapping[str, Choice]) -> bool:

@@ -47,6 +47,8 @@ FIRST = ("position", "velocity", "motor_torque")
 MOST_FILLED, UNEVEN, EVEN = 0.9, 0.5, 0.95
 """A column that is sampled slower than others: at most this part of the rows between its first and last value has one,
 and its times are even: this part of the steps is off by at most this part of the usual step. Lost samples are not."""
+LONGEST_NAME = 60
+"""Letters of a column's name that an error quotes."""
 SAME = 0.01
 """Part of a stated period by which a column of times may differ from it without a word."""
 
@@ -100,7 +102,7 @@ def time_of(
     if first is None:
         raise InputError(
             f"no column is known to be a channel among {_some(table)}; say which is which, "
-            "such as --map time=COLUMN:s --map position=COLUMN:deg"
+            f"such as --map time=COLUMN:s --map position=COLUMN:deg{_of_tool(table)}"
         )
     raise InputError(
         f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give "
@@ -115,6 +117,11 @@ def _period_of(table: Table) -> tuple[str, float] | None:
         if isinstance(value, float) and math.isfinite(value) and value > 0.0 and key in (*PERIODS, *RATES):
             return name, value if key in PERIODS else 1.0 / value
     return None
+
+
+def _of_tool(table: Table) -> str:
+    """What is known of the tool that wrote the table, for an error."""
+    return "".join(f"; {f.message}; {f.remedy}" for f in table.findings if f.code == "tool")
 
 
 def _by_header(table: Table) -> str:
@@ -144,6 +151,7 @@ def times_of(table: Table, choices: Sequence[Choice], sample_time: float | None)
 
 def _some(table: Table) -> str:
     names = [c.name or "one without a name" for c in table.columns]
+    names = [name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..." for name in names]
     return ", ".join(names[:12]) + (", ..." if len(names) > 12 else "") if names else "none at all"
 
 

@@ -4,32 +4,68 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
+from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.readers._cells import moment
+from stickslip.readers.limits import MAX_COLUMNS, insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Column, Table
 
 MAX_DEPTH = 12
 MAX_WIDTH = 64
 """A matrix with more columns than this is a picture or a map, not signals."""
+MAX_PARTS = 10 * MAX_COLUMNS
+"""Groups, arrays and single values of a tree."""
 NAMES = ("name", "Name", "label", "blockName", "Label")
 VALUES = ("values", "Values", "data", "Data", "value")
 TIMES = ("time", "Time", "t", "timestamp")
 
 
 class _Layout:
-    """Collects what a tree holds."""
+    """Collects what a tree holds; `source` is the file that it comes from, None for data in memory."""
 
-    def __init__(self) -> None:
+    def __init__(self, source: Path | None) -> None:
+        self._source = source
+        self._within: set[int] = set()
+        """The containers around the value that is laid out, by identity."""
+        self._parts = 0
         self.columns: list[Column] = []
         self.constants: dict[str, float | str] = {}
         self.findings: list[Finding] = []
         self.unread: dict[str, str] = {}
 
     def walk(self, name: str, value: Any, depth: int = 0) -> None:
-        """Lay out one value under a name."""
+        """Lay out one value under a name.
+
+        Raises
+        ------
+        InputError
+            If a container contains itself, or there are too many parts or columns.
+        """
+        self._parts += 1
+        if self._parts > MAX_PARTS:
+            raise InputError(
+                f"{self._source or 'log'} has more than {MAX_PARTS} groups and values beside the samples; give only "
+                "the columns that you need"
+            )
+        if isinstance(value, (str, bytes, bool, int, float)):
+            self._lay_out(name, value, depth)
+            return
+        if id(value) in self._within:
+            raise InputError(
+                f"{self._source or 'log'}: {name!r} contains itself; give columns of plain numbers"
+            )
+        self._within.add(id(value))
+        try:
+            self._lay_out(name, value, depth)
+        finally:
+            self._within.discard(id(value))
+
+    def _lay_out(self, name: str, value: Any, depth: int) -> None:
         if depth > MAX_DEPTH:
             self._skipped(name, f"is nested deeper than {MAX_DEPTH} levels")
         elif isinstance(value, Mapping):
@@ -78,7 +114,9 @@ class _Layout:
             self._ragged(name, value, depth)
             return
         numbers = as_numbers(value)
-        if numbers is None:
+        if numbers is not None and _unit_of(value[:1]):
+            self._add(Column(name, numbers, "s"))
+        elif numbers is None:
             self._skipped(name, "holds no numbers")
             self.unread[name] = str(value[0])[:30]
         else:
@@ -97,6 +135,10 @@ class _Layout:
         """A list of samples, each a mapping: one column a key."""
         flat = [_flat(sample) for sample in samples]
         keys = dict.fromkeys(key for sample in flat for key in sample)
+        insist_on_columns(self._source or "log", len(keys))
+        if self._source is not None:
+            # Samples that each have other keys make a table with far more cells than the file has numbers.
+            insist_on_values(self._source, len(keys) * len(flat))
         for key in keys:
             values = [as_number(sample.get(key)) for sample in flat]
             words = [s[key] for s in flat if isinstance(s.get(key), str)]
@@ -104,7 +146,7 @@ class _Layout:
                 self.unread[key] = words[0][:30]
                 continue
             # The list's own name says nothing about a signal.
-            self.columns.append(Column(key, np.array(values)))
+            self._add(Column(key, np.array(values), _unit_of(words)))
 
     def _array(self, name: str, value: np.ndarray[Any, Any], depth: int) -> None:
         if value.dtype.names:
@@ -127,7 +169,7 @@ class _Layout:
             self.constants[name] = float(numbers)
         elif numbers.ndim == 1:
             if numbers.size:
-                self.columns.append(Column(name, numbers))
+                self._add(Column(name, numbers))
         elif numbers.ndim == 2:
             self._matrix(name, numbers)
         else:
@@ -139,21 +181,30 @@ class _Layout:
             self._skipped(name, f"has {rows.shape[1]} columns; at most {MAX_WIDTH} are read")
             return
         for i in range(rows.shape[1]):
-            self.columns.append(
-                Column(f"{name}[{i}]" if name else f"column {i + 1}", np.ascontiguousarray(rows[:, i]))
-            )
+            self._add(Column(f"{name}[{i}]" if name else f"column {i + 1}", np.ascontiguousarray(rows[:, i])))
+
+    def _add(self, column: Column) -> None:
+        self.columns.append(column)
+        insist_on_columns(self._source or "log", len(self.columns))
 
     def _skipped(self, name: str, why: str) -> None:
         self.findings.append(Finding("note", "not-read", f"{name or 'the file'!r} {why}; it was left out"))
 
 
-def table_of(format_name: str, tree: Any, name: str = "", findings: Sequence[Finding] = ()) -> Table:
+def table_of(
+    format_name: str, tree: Any, source: Path | None = None, findings: Sequence[Finding] = ()
+) -> Table:
     """Lay out a tree of mappings, lists and arrays.
 
     Where two or more of its groups hold a time of their own, the columns of each get it as their clock.
+
+    Raises
+    ------
+    InputError
+        If a container contains itself, or there are more columns or values than are read from the file `source`.
     """
-    layout = _Layout()
-    layout.walk(name, tree)
+    layout = _Layout(source)
+    layout.walk("", tree)
     said = (*findings, *layout.findings)
     return Table(format_name, _with_clocks(layout.columns), layout.constants, said, layout.unread)
 
@@ -202,13 +253,17 @@ def _is_uneven(value: Any) -> bool:
     return isinstance(value, list) and any(isinstance(i, (list, Mapping)) for i in cast("list[Any]", value))
 
 
-def _flat(sample: Mapping[str, Any], prefix: str = "", depth: int = 0) -> dict[str, Any]:
+def _flat(
+    sample: Mapping[str, Any], prefix: str = "", depth: int = 0, within: frozenset[int] = frozenset()
+) -> dict[str, Any]:
     """One sample without nesting: mappings joined by dots, vectors by [i]."""
     out: dict[str, Any] = {}
+    if id(sample) in within:
+        raise InputError(f"log: {prefix!r} contains itself; give columns of plain numbers")
     for key, value in sample.items():
         name = _join(prefix, str(key))
         if isinstance(value, Mapping) and depth < MAX_DEPTH:
-            out |= _flat(cast("Mapping[str, Any]", value), name, depth + 1)
+            out |= _flat(cast("Mapping[str, Any]", value), name, depth + 1, within | {id(sample)})
         elif isinstance(value, (list, tuple)):
             items = cast("Sequence[Any]", value)
             out |= {f"{name}[{i}]": item for i, item in enumerate(items[:MAX_WIDTH])}
@@ -218,18 +273,27 @@ def _flat(sample: Mapping[str, Any], prefix: str = "", depth: int = 0) -> dict[s
 
 
 def as_number(value: Any) -> float:
-    """One value as a float; NaN where it is none."""
+    """One value as a float, that of a date in s since 1970; NaN where it is none."""
     if isinstance(value, (bool, int, float, np.number, np.bool_)):
         try:
             return float(cast("Any", value))
-        except (OverflowError, TypeError):
+        except OverflowError:  # a whole number that no float holds
+            return math.copysign(math.inf, 1 if cast("Any", value) > 0 else -1)
+        except TypeError:
             return math.nan
     if isinstance(value, str):
         try:
             return float(value)
         except ValueError:
-            return math.nan
+            date = moment(value.strip())
+            return math.nan if date is None else date
     return math.nan
+
+
+def _unit_of(values: Sequence[Any]) -> str:
+    """Seconds if the first value is the text of a date or of a time of day; else no unit."""
+    first = values[0] if values else None
+    return "s" if isinstance(first, str) and moment(first.strip()) is not None else ""
 
 
 def as_numbers(values: Sequence[Any]) -> np.ndarray[Any, np.dtype[np.float64]] | None:

@@ -13,6 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from stickslip.capacity import limit_memory
+
 T = TypeVar("T")
 PATIENCE = 20.0
 """s until reading a file is given up, and as much again for every 200 MB."""
@@ -27,7 +29,7 @@ def patience(path: Path) -> float:
     return PATIENCE * (1.0 + path.stat().st_size / 200e6)
 
 
-def call(function: Callable[..., T], *arguments: Any, limit: float) -> T:
+def call(function: Callable[..., T], *arguments: Any, limit: float, memory: int = 0) -> T:
     """``function(*arguments)``; what it raises is raised here.
 
     Parameters
@@ -36,6 +38,9 @@ def call(function: Callable[..., T], *arguments: Any, limit: float) -> T:
         One with a name in an importable module, as are the arguments' types and the answer's.
     limit : float
         s, after which the process is ended.
+    memory : int
+        Bytes that the process may hold (where the system can limit them), beyond which it raises `MemoryError`; 0 for
+        no limit.
 
     Raises
     ------
@@ -49,14 +54,14 @@ def call(function: Callable[..., T], *arguments: Any, limit: float) -> T:
     try:
         done = subprocess.run(
             [sys.executable, "-P", "-m", __name__],
-            input=pickle.dumps((function, arguments)),
+            input=pickle.dumps((function, arguments, memory)),
             capture_output=True,
             timeout=limit,
             env={**os.environ, "PYTHONPATH": paths},
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise Died(f"found no end in {limit:.0f} s") from None
+        raise Died(f"timed out after {limit:.0f} s") from None
     if done.returncode != 0:
         said = done.stderr.decode("utf-8", "replace").strip().rsplit("\n", 1)[-1]
         raise Died(f"crashed, exit code {done.returncode}{': ' + said if said else ''}")
@@ -70,8 +75,10 @@ def _serve() -> None:
     """Read the call from stdin, write its answer or its exception to stdout."""
     channel = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a library prints is no part of the answer
-    function, arguments = pickle.load(sys.stdin.buffer)
+    function, arguments, memory = pickle.load(sys.stdin.buffer)
     try:
+        if memory:
+            limit_memory(memory)
         answer = (function(*arguments), None)
     except Exception as error:
         answer = (None, error)

@@ -121,7 +121,11 @@ def listed_names(columns: Sequence[Column]) -> str:
 def with_rates(columns: Sequence[Column], names: dict[str, Name]) -> dict[str, Name]:
     """Return what the names say, with `qd` as the velocity if other names or the values show that it is one."""
     symbols = {n: name.family.removesuffix("[]") for n, name in names.items()}
-    unsure = [c for c in columns if symbols[c.name] in RATES and names[c.name].role == "position_reference"]
+    unsure = [
+        c
+        for c in columns
+        if not c.channel and symbols[c.name] in RATES and names[c.name].role == "position_reference"
+    ]
     others = {name.role for n, name in names.items() if symbols[n] not in RATES}
     if not unsure or "velocity" in others:
         return names

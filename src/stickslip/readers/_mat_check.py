@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from struct import unpack_from
 
@@ -21,6 +22,8 @@ CELL, STRUCT, OBJECT, CHAR, SPARSE, FUNCTION, OPAQUE = 1, 2, 3, 4, 5, 16, 17
 NUMERIC = range(6, 16)
 MAX_DIMENSIONS = 32
 MAX_DEPTH = 100
+STEP = 2**24
+"""Bytes that are decompressed at a time."""
 
 
 class Damaged(ValueError):
@@ -43,6 +46,8 @@ class _Bytes:
 
     data: memoryview
     order: str
+    numbers: list[int]
+    """The count of numbers in the arrays that were checked, in one place"""
 
     def element(self, at: int, end: int, padded: bool = True) -> _Element:
         """The data element at a place, which must lie before `end`."""
@@ -67,8 +72,15 @@ class _Bytes:
         return element
 
 
-def check(content: bytes) -> None:
-    """Hold a file of version 5 to 7.2 against its format.
+def check(content: bytes, insist_on_values: Callable[[int], None] = lambda _: None) -> int:
+    """Compare a file of version 5 to 7.2 with its format. Returns the count of variables.
+
+    Parameters
+    ----------
+    content : bytes
+    insist_on_values : callable
+        Refuses a count of numbers that is too large; called while variables are decompressed, and with the count of
+        the numbers in all arrays.
 
     Raises
     ------
@@ -80,23 +92,37 @@ def check(content: bytes) -> None:
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
     if order is None:
         raise Damaged("its header does not tell the order of bytes")
-    file = _Bytes(memoryview(content), order)
+    variables, numbers = 0, [0]
+    file = _Bytes(memoryview(content), order, numbers)
     at = HEADER
     while at < len(content):
         element = file.element(at, len(content), padded=False)
         if element.kind == COMPRESSED:
-            inner = _Bytes(memoryview(_inflated(content[element.start : element.end], at)), order)
+            data = _inflated(content[element.start : element.end], at, insist_on_values)
+            inner = _Bytes(memoryview(data), order, numbers)
             _matrix(inner, inner.of((MATRIX,), 0, len(inner.data)), 0)
         elif element.kind == MATRIX:
             _matrix(file, element, 0)
         else:
             raise Damaged(f"the variable at byte {at} has type {element.kind}, which cannot be there")
         at = element.end
+        variables += 1
+        insist_on_values(numbers[0])
+    return variables
 
 
-def _inflated(packed: bytes, at: int) -> bytes:
+def _inflated(packed: bytes, at: int, insist_on_values: Callable[[int], None]) -> bytearray:
+    """Decompress a variable, in steps whose size is checked."""
+    engine = zlib.decompressobj()
+    out = bytearray()
     try:
-        return zlib.decompress(packed)
+        while not engine.eof and packed:
+            out += engine.decompress(packed, STEP)
+            packed = engine.unconsumed_tail
+            insist_on_values(len(out) // 8)
+        if not engine.eof:
+            raise zlib.error("it is cut off")
+        return out
     except zlib.error as error:
         raise Damaged(f"the variable at byte {at} cannot be decompressed ({error})") from None
 
@@ -132,6 +158,7 @@ def _matrix(file: _Bytes, matrix: _Element, depth: int) -> None:
         for _ in range(1 + complex_):  # MATLAB 7 calls bytes of truth values doubles here
             at = file.of(tuple(BYTES), at, end).following
     elif kind in NUMERIC:
+        file.numbers[0] += count
         for _ in range(1 + complex_):
             at = _numbers(file, at, end, BYTES, count)
     elif kind == FUNCTION:

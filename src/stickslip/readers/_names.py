@@ -22,13 +22,13 @@ from stickslip.readers._vocabulary import (
     FORCE_SYMBOL,
     LOAD_SIDE,
     MOTOR_SIDE,
+    NAMED_BY_UNIT,
     NO_SIGNAL,
     NO_TAIL,
     OF_OTHERS,
     OF_REFERENCE,
     OTHER_COMPOUNDS,
     REFERENCED,
-    SECONDS,
     SENSOR,
     SKIP,
     WHOLE,
@@ -40,8 +40,8 @@ KINDS: dict[str, tuple[str, ...]] = {
     "position": ("angle", "length", "counts"),
     "position_reference": ("angle", "length", "counts"),
     "position_error": ("angle", "length", "counts"),
-    "velocity": ("angular velocity", "velocity", "count rate"),
-    "velocity_reference": ("angular velocity", "velocity", "count rate"),
+    "velocity": ("angular velocity", "velocity", "count rate", "electrical speed"),
+    "velocity_reference": ("angular velocity", "velocity", "count rate", "electrical speed"),
     "acceleration": ("angular acceleration", "acceleration"),
     "motor_torque": ("torque", "force", "share"),
     "friction_torque": ("torque", "force"),
@@ -184,7 +184,7 @@ def _pieces(name: str, unit: str) -> tuple[str, str, list[str], str]:
     bare, inner = _without_unit(INDEX.sub("", name))
     if not unit and not inner and not _whole(bare):
         bare, inner = _without_tail(bare)
-    stated = unit or inner or (bare if bare.lower() in SECONDS else "")
+    stated = unit or inner or (bare if bare.lower() in NAMED_BY_UNIT else "")
     parts = words(bare)
     if (match := LETTERED.search(bare)) is not None:
         number, parts = match[1].lower(), words(bare[: match.start(1)] + bare[match.end(1) :])
@@ -278,6 +278,8 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
         return "sensor_torque", 1
     if "load" in found and len(found) > 1:
         found.remove("load")  # "load position" is a position on the load's side
+    if {"supply", "current"} <= set(found):
+        return "", 0  # the supply's current is not the motor's
     for one in ("friction_torque", "supply"):
         if one in found:
             found = [one]
@@ -310,6 +312,11 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
     role = found[0]
     if role == "motor_torque" and not OF_OTHERS.isdisjoint(parts):
         return "", 0
+    if {"motor_torque", "current"} <= set(found):
+        # The last noun counts: "torque current" is a current, "current as torque" a torque.
+        role = max(
+            ("motor_torque", "current"), key=lambda r: max(parts.index(w) for w in WORDS[r] if w in parts)
+        )
     if is_reference and role == "motor_torque":
         return role, 0
     if is_reference:
@@ -330,7 +337,8 @@ def _role_by_unit(parts: list[str], unit: Unit) -> str:
     """What an unknown name with a telling unit must be; empty where the unit tells too little."""
     if not OF_REFERENCE.isdisjoint(parts):
         return "motor_torque" if unit.kind == "torque" else ""
-    return {"angular velocity": "velocity", "torque": "motor_torque", "current": "current", "voltage": "voltage",
+    return {"angular velocity": "velocity", "electrical speed": "velocity", "torque": "motor_torque",
+            "current": "current", "voltage": "voltage",
             "temperature": "temperature", "angle": "position", "counts": "position"}.get(unit.kind, "")  # fmt: skip
 
 

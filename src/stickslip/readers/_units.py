@@ -10,6 +10,7 @@ SI = {
     "time": "s", "angle": "rad", "length": "m", "angular velocity": "rad/s", "velocity": "m/s",
     "angular acceleration": "rad/s²", "acceleration": "m/s²", "torque": "N·m", "force": "N", "current": "A",
     "voltage": "V", "temperature": "°C", "share": "1", "counts": "counts", "count rate": "counts/s",
+    "electrical speed": "rad/s",
 }  # fmt: skip
 """The unit of each kind of quantity in a record. Temperatures are in °C, as in `Surroundings`."""
 
@@ -53,6 +54,7 @@ PLAIN: dict[str, Unit] = {
     **dict.fromkeys(("rps", "rev/s", "u/s", "r/s", "turn/s", "turns/s", "umdr/s", "revs/s"),
                     Unit("angular velocity", TURN)),
     "krpm": Unit("angular velocity", TURN / 60 * 1e3), "mrpm": Unit("angular velocity", TURN / 60 * 1e-3),
+    "erpm": Unit("electrical speed", TURN / 60),
     "dps": Unit("angular velocity", TURN / 360), "rads-1": Unit("angular velocity"),
     # Torques and forces that are not metric
     "lbin": Unit("torque", POUND_FORCE * INCH), "lbfin": Unit("torque", POUND_FORCE * INCH),
@@ -161,7 +163,7 @@ def spellings(kinds: tuple[str, ...]) -> str:
         "time": "s, ms, us", "angle": "rad, deg, rev", "length": "m, mm, um", "angular velocity": "rad/s, deg/s, rpm",
         "velocity": "m/s, mm/s", "torque": "Nm, mNm, Nmm", "force": "N, mN", "current": "A, mA", "voltage": "V, mV",
         "temperature": "degC, K", "share": "percent, permille", "counts": "counts", "count rate": "counts/s",
-        "angular acceleration": "rad/s2", "acceleration": "m/s2",
+        "electrical speed": "erpm", "angular acceleration": "rad/s2", "acceleration": "m/s2",
     }  # fmt: skip
     return ", ".join(usual[kind] for kind in kinds)
 

@@ -30,7 +30,7 @@ WORDS = _table(
         positionssollwert posizione posicion
     velocity: velocity velocities vel velo speed geschwindigkeit drehzahl omega qvel nist nsoll vist vsoll
         drehzahlistwert drehzahlsollwert istdrehzahl solldrehzahl actvelo setvelo istgeschwindigkeit
-        sollgeschwindigkeit geschw dtheta dphi rpm vitesse velocita velocidad
+        sollgeschwindigkeit geschw dtheta dphi rpm erpm vitesse velocita velocidad
         motordrehzahl
     acceleration: acceleration acc accel beschleunigung ddtheta acceler
     motor_torque: torque torques trq tau drehmoment moment effort kraft force istmoment sollmoment
@@ -85,8 +85,8 @@ OF_REFERENCE = _words(
 )
 """Words that say that a quantity is a reference, not measured."""
 
-SECONDS = frozenset(["sec", "secs", "ms", "msec", "millis"])
-"""Names of a time that are its unit. A bare "s" may as well be a displacement (and does not beat a "t")."""
+NAMED_BY_UNIT = frozenset(["sec", "secs", "ms", "msec", "millis", "rpm", "erpm"])
+"""Names of a time or a speed that are its unit. A bare "s" may as well be a displacement (and does not beat a "t")."""
 ERROR = frozenset(["deviation", "diff", "err", "error", "fehler", "following", "lag"])
 LOAD_SIDE = frozenset(
     [

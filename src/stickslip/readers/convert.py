@@ -35,6 +35,7 @@ MOTION = (
 EFFORT = ("motor_torque", "friction_torque", "sensor_torque", "compensation_torque")
 NUMBERS = (
     "counts_per_rev", "rated_torque", "rated_current", "torque_constant", "force_constant", "gear_ratio", "lead",
+    "pole_pairs",
 )  # fmt: skip
 """What a drive's data sheet says, each a positive number."""
 TURNING = ("torque_constant", "lead", "gear_ratio")
@@ -66,6 +67,8 @@ class Drive:
     lead : float
         m that a linear axis moves for one revolution: a screw's lead, a pinion's or pulley's circumference. Where a
         record has both lengths and torques (angles and forces), all becomes lengths and forces.
+    pole_pairs : float
+        Electrical revolutions for one of the motor, for speeds in electrical revolutions a minute (eRPM).
     """
 
     counts_per_rev: float = math.nan
@@ -76,6 +79,7 @@ class Drive:
     gear_ratio: float = math.nan
     side: str = "motor"
     lead: float = math.nan
+    pole_pairs: float = math.nan
 
     def __post_init__(self) -> None:
         for name in NUMBERS:
@@ -173,6 +177,7 @@ def _reading(
         "drive": drive.known(),
         "time_origin": origin,
         "findings": [f.as_data() for f in said],
+        "runs": list(table.runs),
     }
 
 
@@ -181,6 +186,8 @@ def _reading(
 
 def _drives(column: Column) -> bool:
     """Whether a column may say what drives the axis: its unit is one of torque, force, current or a share."""
+    if column.channel:
+        return False
     unit = column.unit if parse_unit(column.unit) else role_of(column.name).unit
     parsed = parse_unit(unit)
     return parsed is not None and parsed.kind in ("torque", "force", "current", "share")
@@ -215,6 +222,12 @@ def _scale(choice: Choice, unit: Unit, drive: Drive) -> tuple[float, str, list[s
         factor *= 2.0 * math.pi / per_rev
         kind = "angle" if kind == "counts" else "angular velocity"
         steps.append(f"2π / {per_rev:g} counts")
+    elif kind == "electrical speed":
+        pairs = _needed(
+            drive.pole_pairs, choice, "electrical revolutions per minute (eRPM)", "--pole-pairs N"
+        )
+        factor, kind = factor / pairs, "angular velocity"
+        steps.append(f"{pairs:g} pole pairs")
     elif kind == "share" and choice.role in ("motor_torque", "compensation_torque"):
         rated = _needed(drive.rated_torque, choice, "a share of the rated torque", "--rated-torque")
         factor, kind = factor * rated, "torque"

@@ -21,6 +21,7 @@ from stickslip.readers._column_groups import Layout
 from stickslip.readers._signs import between_thousands
 from stickslip.readers._stated_period import is_period
 from stickslip.readers._units import may_be_unit
+from stickslip.readers.limits import LONGEST_LINE, MAX_COLUMNS, insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Array, Column, Format, Table
 
 DIALECTS = (
@@ -37,6 +38,8 @@ DIALECTS = (
 """Delimiter and decimal sign, in the order in which ties are decided; a comma is both where cells stand in quotes."""
 SAMPLE = 400
 """Lines from which the dialect is told."""
+SAMPLED, FEWEST = 2_000_000, 20
+"""Characters of these lines, and the lines that are used however long they are."""
 USUAL = 0.8
 """Part of the lines of a sample in which a column of numbers holds one: header and footer are the rest"""
 COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s*")
@@ -72,17 +75,21 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """Every column of a text table."""
-    lines = clocks_whole(decoded(path).splitlines())
+    lines = decoded(path).splitlines()
+    _insist_on_short_lines(path, lines)
+    lines = clocks_whole(lines)
     try:
         layout = _column_groups.find_layout(lines)
-        return _plain(path, lines) if layout is None else _in_groups(lines, layout)
+        return _plain(path, lines) if layout is None else _in_groups(path, lines, layout)
     except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+        raise error if str(error).startswith(str(path)) else InputError(f"{path}: {error}") from None
 
 
-def _in_groups(lines: Sequence[str], layout: Layout) -> Table:
+def _in_groups(path: Path, lines: Sequence[str], layout: Layout) -> Table:
     """Read a table with rows of keys above groups of a time and its channels."""
+    insist_on_columns(path, layout.width)
     body = [layout.split(line) for line in lines[layout.first :] if line.strip()]
+    insist_on_values(path, len(body) * layout.width)
     some = body[:SAMPLE] + body[-SAMPLE:]
     columns = [[row[j] for row in some if j < len(row)] for j in range(layout.width)]
     decimal = max(
@@ -128,12 +135,14 @@ def _padded(body: Sequence[Sequence[str]], dialect: Dialect) -> tuple[Array, lis
 
 def _plain(path: Path, lines: Sequence[str]) -> Table:
     """Read a table with one row of names."""
-    dialect = _sniff(lines)
+    dialect = _sniff(path, lines)
+    insist_on_columns(path, dialect.width)
     above = [line for line in lines[: dialect.start] if line.strip()]
     header = [dialect.split(COMMENT.sub("", line)) for line in above]
     body = [line for line in lines[dialect.start :] if line.strip()]
     body, findings = _without_headers(body, above, dialect)
     body, footer = _without_footer(body, dialect)
+    insist_on_values(path, len(body) * dialect.width)
     values, odd = _values(body, dialect)
     findings += [*footer, *odd]
     names, units = _names(header, dialect.width)
@@ -178,10 +187,27 @@ def _unread(names: Sequence[str], body: Sequence[str], dialect: Dialect) -> dict
 # ---- lines to cells -----------------------------------------------------------------------------------------
 
 
-def _sniff(lines: Sequence[str]) -> Dialect:
+def _insist_on_short_lines(path: Path, lines: Sequence[str]) -> None:
+    """Refuse lines that are no row of a table.
+
+    Raises
+    ------
+    InputError
+    """
+    longest = max(range(len(lines)), key=lambda i: len(lines[i]), default=0)
+    if lines and len(lines[longest]) > LONGEST_LINE:
+        raise InputError(
+            f"{path}: line {longest + 1} has {len(lines[longest])} characters; at most {LONGEST_LINE} are read: give "
+            f"one row of at most {MAX_COLUMNS} columns a line"
+        )
+
+
+def _sniff(path: Path, lines: Sequence[str]) -> Dialect:
     """The dialect under which most lines of a sample are rows of numbers of one width."""
     filled = [(i, line) for i, line in enumerate(lines) if line.strip()]
-    sample = filled[:SAMPLE] if len(filled) <= SAMPLE else filled[: SAMPLE // 2] + filled[-SAMPLE // 2 :]
+    longest = max((len(line) for _, line in filled), default=0)
+    count = min(SAMPLE, max(FEWEST, SAMPLED // (longest + 1)))
+    sample = filled if len(filled) <= count else filled[: count // 2] + filled[-count // 2 :]
     best, score = None, 0.0
     for delimiter, decimal in DIALECTS:
         trial = Dialect(delimiter, decimal, 0, 0)

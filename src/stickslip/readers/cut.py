@@ -118,7 +118,8 @@ def cut(record: Record, asked: Cut) -> Record:
 
 
 def pieces(record: Record) -> tuple[list[Record], list[Finding]]:
-    """The record cut in two wherever more than `BRIDGED` rows were left out; and what became of short pieces.
+    """The record cut in two wherever another run starts or more than `BRIDGED` rows were left out; and what became of
+    short pieces.
 
     Raises
     ------
@@ -126,7 +127,10 @@ def pieces(record: Record) -> tuple[list[Record], list[Finding]]:
         If no piece is long enough.
     """
     rows = file_rows(record)
-    holes = np.flatnonzero(np.diff(rows) > BRIDGED + 1) + 1
+    starts: list[int] = record.meta.get("reading", {}).get("runs", [])
+    numpy: Any = np
+    runs = numpy.searchsorted(starts, rows, side="right")
+    holes = numpy.flatnonzero((np.diff(rows) > BRIDGED + 1) | (numpy.diff(runs) != 0)) + 1
     if not holes.size:
         return [record], []
     index = np.arange(len(record))

@@ -8,18 +8,20 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.finding import Finding
 from stickslip.readers import _guard
 from stickslip.readers._flatten import table_of
-from stickslip.readers.table_columns import Column, Format, Table
+from stickslip.readers.limits import insist_on_columns, insist_on_values, memory_for, size_of, too_large
+from stickslip.readers.table_columns import Format, Table
 
 UNIT_KEYS = ("unit", "units", "Unit", "Units")
-MAX_ITEMS = 4000
 
 
 def recognise(head: bytes, path: Path) -> bool:
@@ -35,7 +37,16 @@ def read(path: Path) -> Table:
 def read_tree(path: Path, format_name: str, matlab: bool) -> Table:
     """Read the groups of an HDF5 file; `matlab` says that strings are stored as numbers."""
     try:
-        return _guard.call(_read_here, path, format_name, matlab, limit=_guard.patience(path))
+        return _guard.call(
+            _read_here,
+            path,
+            format_name,
+            matlab,
+            limit=_guard.patience(path),
+            memory=memory_for(size_of(path)),
+        )
+    except MemoryError:
+        raise too_large(path) from None
     except _guard.Died as error:
         raise InputError(
             f"{path} is damaged: the HDF5 library {error}; check that it is complete, or export it again"
@@ -44,66 +55,95 @@ def read_tree(path: Path, format_name: str, matlab: bool) -> Table:
 
 def _read_here(path: Path, format_name: str, matlab: bool) -> Table:
     h5py: Any = importlib.import_module("h5py")
-    units: dict[str, str] = {}
     try:
         with h5py.File(path, "r") as file:
-            tree = _group(h5py, file, "", units, matlab, [0])
-    except InputError:
+            reading = _Reading(h5py, path, matlab)
+            tree = reading.group(file, "")
+    except (InputError, MemoryError):
         raise
     except Exception as error:  # h5py passes on whatever the C library says
         raise InputError(
             f"{path} cannot be read as HDF5 ({type(error).__name__}: {error}); check that it is complete"
         ) from None
-    table = table_of(format_name, tree)
-    columns = tuple(Column(c.name, c.values, units.get(c.name, c.unit), c.clock) for c in table.columns)
-    return Table(format_name, columns, table.constants, table.findings)
+    table = table_of(format_name, tree, path, findings=reading.findings)
+    columns = tuple(replace(c, unit=reading.units.get(c.name, c.unit)) for c in table.columns)
+    return replace(table, columns=columns)
 
 
-def _group(
-    h5py: Any, group: Any, path: str, units: dict[str, str], matlab: bool, count: list[int]
-) -> dict[str, Any]:
-    out: dict[str, Any] = {}
-    for key in group:
-        if matlab and key.startswith("#"):
-            continue
-        # A broken link is no reason to give up the rest.
-        item = group.get(key, None)
-        name = f"{path}.{key}" if path else str(key)
-        count[0] += 1
-        if count[0] > MAX_ITEMS:
-            raise InputError(
-                f"{group.file.filename} has more than {MAX_ITEMS} groups and datasets; export the signals you need"
-            )
-        if isinstance(item, h5py.Group):
-            if name.count(".") <= 12:
-                out[str(key)] = _group(h5py, item, name, units, matlab, count)
-        elif isinstance(item, h5py.Dataset):
-            out[str(key)] = _dataset(h5py, item, matlab)
-            if unit := next((_text(item.attrs[k]) for k in UNIT_KEYS if k in item.attrs), ""):
-                units[name] = unit
-    for key, value in cast("Mapping[str, Any]", group.attrs).items():
-        if (
-            np.ndim(value) == 0
-            and str(key) not in out
-            and not str(key).startswith(("MATLAB", "H5", "CLASS", "TITLE"))
-        ):
-            out[str(key)] = value if isinstance(value, (str, bytes)) else np.asarray(value)
-    return out
+class _Reading:
+    """Goes through the groups of a file; what is in other files is not followed."""
 
+    def __init__(self, h5py: Any, path: Path, matlab: bool) -> None:
+        self.h5py, self.path, self.matlab = h5py, path, matlab
+        self.units: dict[str, str] = {}
+        self.findings: list[Finding] = []
+        self._within: set[int] = set()
+        """Addresses of the groups around the one that is read."""
+        self._items = 0
+        self._values = 0
 
-def _dataset(h5py: Any, item: Any, matlab: bool) -> Any:
-    if item.shape is None:
+    def group(self, group: Any, path: str) -> dict[str, Any]:
+        """The datasets, groups and attributes of a group, by name."""
+        h5py = self.h5py
+        out: dict[str, Any] = {}
+        self._items += len(group)
+        insist_on_columns(self.path, self._items)
+        address = h5py.h5o.get_info(group.id).addr
+        self._within.add(address)
+        for key in group:
+            if self.matlab and key.startswith("#"):
+                continue
+            name = f"{path}.{key}" if path else str(key)
+            link = group.get(key, getlink=True)
+            if isinstance(link, h5py.ExternalLink):
+                self._elsewhere(name, str(link.filename))
+                continue
+            # A broken link is no reason to give up the rest.
+            item = group.get(key, None)
+            if isinstance(item, h5py.Group):
+                # A link to a group around it leads to nothing new.
+                if name.count(".") <= 12 and h5py.h5o.get_info(item.id).addr not in self._within:
+                    out[str(key)] = self.group(item, name)
+            elif isinstance(item, h5py.Dataset):
+                out[str(key)] = self._dataset(item, name)
+                if unit := next((_text(item.attrs[k]) for k in UNIT_KEYS if k in item.attrs), ""):
+                    self.units[name] = unit
+        self._within.discard(address)
+        for key, value in cast("Mapping[str, Any]", group.attrs).items():
+            if (
+                np.ndim(value) == 0
+                and str(key) not in out
+                and not str(key).startswith(("MATLAB", "H5", "CLASS", "TITLE"))
+            ):
+                out[str(key)] = value if isinstance(value, (str, bytes)) else np.asarray(value)
+        return out
+
+    def _dataset(self, item: Any, name: str) -> Any:
+        if item.shape is None:
+            return None
+        files = [str(source[0]) for source in item.external or ()]
+        if item.is_virtual:
+            files += [str(source.file_name) for source in item.virtual_sources() if source.file_name != "."]
+        if files:
+            return self._elsewhere(name, files[0])
+        self._values += item.size * max(1, len(item.dtype.names or ()))
+        insist_on_values(self.path, self._values)
+        kind = _text(item.attrs["MATLAB_class"]) if self.matlab and "MATLAB_class" in item.attrs else ""
+        if kind == "char":
+            return "".join(chr(int(c)) for c in np.asarray(item[()]).T.ravel()[:1000])
+        if "MATLAB_empty" in item.attrs:
+            return None
+        if item.dtype.kind in "biuf" or item.dtype.names:
+            return np.asarray(item[()])
+        if self.h5py.check_string_dtype(item.dtype) is not None and item.shape == ():
+            return _text(item[()])
         return None
-    kind = _text(item.attrs["MATLAB_class"]) if matlab and "MATLAB_class" in item.attrs else ""
-    if kind == "char":
-        return "".join(chr(int(c)) for c in np.asarray(item[()]).T.ravel()[:1000])
-    if "MATLAB_empty" in item.attrs:
-        return None
-    if item.dtype.kind in "biuf" or item.dtype.names:
-        return np.asarray(item[()])
-    if h5py.check_string_dtype(item.dtype) is not None and item.shape == ():
-        return _text(item[()])
-    return None
+
+    def _elsewhere(self, name: str, file: str) -> None:
+        """Report what the file has in another one."""
+        message = f"{name!r} is stored in another file, {file!r}, which is not opened; it was left out"
+        remedy = "copy the data into one file (h5repack, or h5py's Group.copy with expand_external)"
+        self.findings.append(Finding("warning", "not-read", message, remedy=remedy))
 
 
 def _text(value: Any) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from typing import Any, cast
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.readers._flatten import table_of
 from stickslip.readers._names import ALIASES, KINDS
+from stickslip.readers._tool_columns import with_tool
 from stickslip.readers._units import SI, parse_unit
 from stickslip.readers.convert import LINEAR
 from stickslip.readers.table_columns import Column, Table
@@ -44,7 +46,7 @@ def table_of_signals(
     columns: list[Column] = []
     for name, values in signals.items():
         said = arguments.get(name, name)
-        numbers = numbers_of(said, values)
+        numbers = numbers_of(said, values, dates=name == "time")
         if numbers.ndim != 1:
             raise InputError(f"{said} has shape {numbers.shape}; give one number a sample, shape (n,)")
         columns.append(Column(name, numbers))
@@ -72,8 +74,8 @@ def table_of_signals(
     return Table(FORMAT, tuple(columns)), channels | left_out
 
 
-def numbers_of(name: str, values: Any) -> Array:
-    """A signal's numbers; of dates and of differences of time (NumPy's), seconds from the first.
+def numbers_of(name: str, values: Any, dates: bool = False) -> Array:
+    """A signal's numbers; if `dates` are allowed, those of dates and of differences of time in s from the first.
 
     Raises
     ------
@@ -81,15 +83,70 @@ def numbers_of(name: str, values: Any) -> Array:
         If they are none.
     """
     try:
-        given = unmasked(values)
-        if given.dtype.kind in "mM":
-            first = given[~np.isnat(given)][:1]
-            return np.asarray((given - first) / np.timedelta64(1, "s"), dtype=np.float64)
-        if given.dtype.kind not in "bc":
+        given = with_dates(values)
+        if given.dtype.kind in "mM" and dates:
+            return _seconds(given, given[~np.isnat(given)][:1])
+        if given.dtype.kind not in "bcmM":
             return np.asarray(given, dtype=np.float64)
+    except OverflowError:
+        raise InputError(f"{name} has a number beyond 1.8e308, which no signal has; correct it") from None
     except (TypeError, ValueError):
         pass
-    raise InputError(f"{name} is no array of numbers; give one number a sample")
+    kind = (
+        "of dates, which only the time may be" if _are_dates(values) and not dates else "no array of numbers"
+    )
+    raise InputError(f"{name} is {kind}; give one number a sample")
+
+
+def with_dates(values: Any) -> np.ndarray[Any, Any]:
+    """An array; dates of Python, of pandas and of a time zone as NumPy's (UTC).
+
+    Raises
+    ------
+    TypeError, ValueError
+        If something is masked of what is no number and no date.
+    """
+    if getattr(getattr(values, "dtype", None), "tz", None) is not None:
+        values = array_of(values)
+    given = unmasked(values)
+    if given.dtype != object or given.ndim != 1 or not _are_dates(given):
+        return given
+    return np.array([_date(date) for date in given], dtype="datetime64[ns]")
+
+
+def _are_dates(values: Any) -> bool:
+    """Whether the first value that is there is a date."""
+    try:
+        given = np.asarray(values)
+    except ValueError:  # lists of different lengths, or one that contains itself
+        return False
+    if given.dtype.kind in "mM":
+        return True
+    first = next((v for v in given.ravel() if v is not None), None) if given.dtype == object else None
+    return isinstance(first, (datetime, np.datetime64))
+
+
+def _date(value: Any) -> Any:
+    """A date as NumPy has it; NaT where there is none."""
+    if value is None:
+        return np.datetime64("NaT")
+    if getattr(value, "tzinfo", None) is not None:
+        value = value.astimezone(UTC).replace(tzinfo=None)
+    return value.to_datetime64() if hasattr(value, "to_datetime64") else np.datetime64(value, "ns")
+
+
+def _seconds(dates: np.ndarray[Any, Any], first: Any) -> Array:
+    """Dates or differences of time in s from the first of them; NaN where there is none.
+
+    Raises
+    ------
+    TypeError
+        Of a count of steps without a unit of time.
+    """
+    if np.datetime_data(dates.dtype)[0] == "generic":
+        raise TypeError("a time without a unit")
+    span = (dates - first).astype("timedelta64[ns]")
+    return np.where(np.isnat(span), np.nan, span.astype(np.int64) * 1e-9)
 
 
 def table_in_memory(data: Any) -> Table:
@@ -100,6 +157,8 @@ def table_in_memory(data: Any) -> Table:
     InputError
         If it holds no columns of numbers.
     """
+    if getattr(data, "ndim", None) == 0:
+        data = data.item()  # an array around one object
     if getattr(data, "ndim", 0) == 1 and getattr(getattr(data, "dtype", None), "names", None) is None:
         raise InputError(
             f"log: an array of {len(data)} numbers has no column names; give the signals by name: t=..., "
@@ -121,7 +180,7 @@ def table_in_memory(data: Any) -> Table:
             f"log: {with_article(type(data).__name__)} without columns of numbers is no log; give a path, a data "
             "frame, a mapping of arrays, a Record, or arrays by name (t=..., position=..., torque=...)"
         )
-    return table
+    return with_tool(table)
 
 
 def refuse_the_same_name(names: Sequence[str]) -> None:
@@ -153,14 +212,13 @@ def array_of(column: Any) -> Any:
 
 
 def _plain(values: Any) -> Any:
-    """Arrays of whatever library as NumPy's, dates and durations in s; anything else as it is."""
+    """Arrays of whatever library as NumPy's, dates in s since 1970; anything else as it is."""
     if not hasattr(values, "__array__"):
-        return values
-    numbers = unmasked(values)
-    if numbers.dtype.kind not in "Mm":
-        return numbers
-    seconds = numbers.astype(f"{numbers.dtype.kind}8[ns]").astype(np.int64) * 1e-9
-    return np.where(np.isnat(numbers), np.nan, seconds)
+        first: Any = next(iter(cast("list[Any]", values)), None) if isinstance(values, list) else None
+        dated = isinstance(first, (datetime, np.datetime64))
+        return _seconds(with_dates(values), np.datetime64(0, "s")) if dated else cast("Any", values)
+    numbers = with_dates(values)
+    return _seconds(numbers, np.datetime64(0, "s")) if numbers.dtype.kind == "M" else numbers
 
 
 def digest_of(table: Table) -> str:

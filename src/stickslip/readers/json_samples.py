@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from stickslip.errors import InputError
+from stickslip.readers import _sysid_json
 from stickslip.readers._flatten import table_of
 from stickslip.readers.table_columns import Format, Table
 
@@ -27,11 +28,13 @@ def read(path: Path) -> Table:
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8 text") from None
     tree = _parse(path, text)
+    if _sysid_json.is_sysid(tree):
+        return _sysid_json.table_of_tests(path, tree)
     if isinstance(tree, Mapping):
         parts = cast("Mapping[str, Any]", tree)
         if isinstance(parts.get("columns"), list) and isinstance(parts.get("data"), list):
             tree = _split(parts)
-    return table_of("json", tree)
+    return table_of("json", tree, path)
 
 
 def _parse(path: Path, text: str) -> Any:

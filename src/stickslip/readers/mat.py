@@ -14,6 +14,7 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers import _mat_check, hdf5
 from stickslip.readers._flatten import table_of
+from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Format, Table
 
 
@@ -33,23 +34,26 @@ def read(path: Path) -> Table:
         if (
             0 not in head[:4]
         ):  # version 4 has no text at its beginning, and SciPy reads it without compiled code
-            _mat_check.check(path.read_bytes())
+            variables = _mat_check.check(path.read_bytes(), lambda count: insist_on_values(path, count))
+            insist_on_columns(path, variables)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            variables = cast("Mapping[str, Any]", loadmat(path, simplify_cells=True))
+            loaded = cast("Mapping[str, Any]", loadmat(path, simplify_cells=True))
+    except InputError:
+        raise
     except Exception as error:  # SciPy raises a dozen kinds on a damaged file
         raise InputError(f"{path} is no MAT file that can be read ({type(error).__name__}: {error}); "
                          "save it again with `save file.mat -v7`") from None  # fmt: skip
-    tree = {k: v for k, v in variables.items() if not k.startswith("__") and not _opaque(v)}
+    tree = {k: v for k, v in loaded.items() if not k.startswith("__") and not _opaque(v)}
     findings = [
         Finding("warning", "not-read", f"{k!r} is a MATLAB object, which cannot be read",
                 remedy="save its numbers as arrays, such as `t = ts.Time; q = ts.Data`")
-        for k, v in variables.items() if not k.startswith("__") and _opaque(v)
+        for k, v in loaded.items() if not k.startswith("__") and _opaque(v)
     ]  # fmt: skip
-    if "__function_workspace__" in variables and not findings:
+    if "__function_workspace__" in loaded and not findings:
         findings.append(Finding("warning", "not-read", "the file holds MATLAB objects, which cannot be read",
                                 remedy="save their numbers as arrays"))  # fmt: skip
-    return table_of("mat", tree, findings=findings)
+    return table_of("mat", tree, path, findings=findings)
 
 
 def _opaque(value: Any) -> bool:

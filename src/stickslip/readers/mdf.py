@@ -14,6 +14,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.extras import needed
 from stickslip.readers import _guard
+from stickslip.readers.limits import insist_on_columns, insist_on_values, memory_for, size_of, too_large
 from stickslip.readers.table_columns import Column, Format, Table
 
 
@@ -26,7 +27,9 @@ def read(path: Path) -> Table:
     """Every channel of numbers with its unit and the clock of its group."""
     needed("asammdf", "mdf", "MDF files need")
     try:
-        return _guard.call(_read_here, path, limit=_guard.patience(path))
+        return _guard.call(_read_here, path, limit=_guard.patience(path), memory=memory_for(size_of(path)))
+    except MemoryError:
+        raise too_large(path) from None
     except _guard.Died as error:
         raise InputError(f"{path} is damaged: asammdf {error}; export it again") from None
 
@@ -34,15 +37,21 @@ def read(path: Path) -> Table:
 def _read_here(path: Path) -> Table:
     library = needed("asammdf", "mdf", "MDF files need")
     columns: list[Column] = []
+    count = 0
     try:
         with library.MDF(str(path)) as file:
             for signal in file.iter_channels():
                 values: Any = np.asarray(signal.samples)
                 if values.dtype.kind in "biuf" and values.ndim == 1 and values.size:
+                    count += 2 * values.size
+                    insist_on_values(path, count)
+                    insist_on_columns(path, len(columns) + 1)
                     clock = np.asarray(signal.timestamps, dtype=np.float64)
                     columns.append(
                         Column(str(signal.name), values.astype(np.float64), str(signal.unit or ""), clock)
                     )
+    except (InputError, MemoryError):
+        raise
     except Exception as error:  # asammdf raises several kinds on a damaged file
         raise InputError(
             f"{path} cannot be read as MDF ({type(error).__name__}: {error}); export it again"

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import math
+import zipfile
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.readers._flatten import table_of
+from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Format, Table
+
+NPY = b"\x93NUMPY"
 
 
 def recognise(head: bytes, path: Path) -> bool:
     """The signature of npy, or a zip archive that holds such files."""
-    return head.startswith(b"\x93NUMPY") or (
+    return head.startswith(NPY) or (
         head.startswith(b"PK") and (b".npy" in head or path.suffix.lower() == ".npz")
     )
 
@@ -22,13 +27,48 @@ def recognise(head: bytes, path: Path) -> bool:
 def read(path: Path) -> Table:
     """The arrays of the file: structured ones by field, matrices by column."""
     try:
+        insist_on_arrays(path)
         loaded: Any = np.load(path, allow_pickle=False)
         tree = {k: loaded[k] for k in loaded.files} if hasattr(loaded, "files") else loaded
+    except InputError:
+        raise
     except Exception as error:  # NumPy, zip, zlib and the tokenizer of headers each raise their own
         raise InputError(
             f"{path} cannot be read as NumPy arrays ({error}); save plain arrays of numbers, without objects"
         ) from None
-    return table_of("numpy", tree)
+    return table_of("numpy", tree, path)
+
+
+def insist_on_arrays(path: Path) -> None:
+    """Refuse more arrays or values than may be read, by the headers of the arrays alone.
+
+    Raises
+    ------
+    InputError
+    """
+    with path.open("rb") as file:
+        if file.read(len(NPY)) == NPY:
+            file.seek(0)
+            insist_on_values(path, _values(file))
+            return
+    with zipfile.ZipFile(path) as archive:
+        members = archive.infolist()
+        insist_on_columns(path, len(members))
+        count = 0
+        for member in members:
+            with archive.open(member) as file:
+                count += _values(file)
+            insist_on_values(path, count)
+
+
+def _values(file: IO[bytes]) -> int:
+    """How many values the array has that begins here; 0 where none does. A text of n letters counts as n."""
+    if file.read(len(NPY)) != NPY:
+        return 0
+    major, _ = file.read(2)
+    form: Any = np.lib.format
+    shape, _, kind = (form.read_array_header_1_0 if major == 1 else form.read_array_header_2_0)(file)
+    return math.prod(shape) * max(1, len(kind.names or ()), 0 if kind.names else kind.itemsize // 8)
 
 
 FORMAT = Format("numpy", "NumPy (npy, npz)", (".npy", ".npz"), recognise, read)

@@ -1,4 +1,8 @@
-"""Parquet files; units from the field's metadata (`unit` or `units`)."""
+"""Parquet files; units from the field's metadata (`unit` or `units`).
+
+A column of lists of one length, such as the joints of a robot, becomes a column for each place: ``state[0]``. Columns
+of other types are not loaded.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,8 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.readers.table_columns import Column, Format, Table
+from stickslip.readers.limits import insist_on_columns, insist_on_values
+from stickslip.readers.table_columns import Array, Column, Format, Table
 
 
 def recognise(head: bytes, path: Path) -> bool:
@@ -19,37 +24,94 @@ def recognise(head: bytes, path: Path) -> bool:
 
 
 def read(path: Path) -> Table:
-    """Every column of numbers, truth values or times; nulls become NaN."""
-    parquet: Any = importlib.import_module("pyarrow.parquet")
-    pa: Any = importlib.import_module("pyarrow")
+    """Every column of numbers, truth values, times or lists of numbers; nulls become NaN."""
     try:
-        table: Any = parquet.read_table(path)
-        columns: list[Column] = []
-        findings: list[Finding] = []
-        unread: dict[str, str] = {}
-        for field in table.schema:
-            values = _numbers(pa, table.column(field.name), field.type)
-            if values is None:
-                findings.append(
-                    Finding(
-                        "note",
-                        "not-read",
-                        f"column {field.name!r} holds {field.type}, not numbers; it was left out",
-                    )
-                )
-                unread[str(field.name)] = str(table.column(field.name)[0])[:30] if table.num_rows else ""
-                continue
-            meta: dict[bytes, bytes] = field.metadata or {}
-            unit = (meta.get(b"unit") or meta.get(b"units") or b"").decode("utf-8", "replace")
-            columns.append(Column(str(field.name), values, "s" if pa.types.is_temporal(field.type) else unit))
+        parquet: Any = importlib.import_module("pyarrow.parquet")
+        pa: Any = importlib.import_module("pyarrow")
+        with parquet.ParquetFile(path) as file:
+            return _read(pa, file, path)
+    except InputError:
+        raise
     except Exception as error:  # Arrow raises its own, OSError, ValueError, ...
         raise InputError(
             f"{path} cannot be read as Parquet ({type(error).__name__}: {error}); check that it is complete"
         ) from None
+
+
+def _read(pa: Any, file: Any, path: Path) -> Table:
+    schema: Any = file.schema_arrow
+    insist_on_columns(path, len(schema))
+    known = [str(field.name) for field in schema if _is_known(pa, _element(pa, field.type))]
+    _insist_on_size(path, file.metadata, {*known})
+    table: Any = file.read(columns=known)
+    columns: list[Column] = []
+    findings: list[Finding] = []
+    unread: dict[str, str] = {}
+    for field in schema:
+        name = str(field.name)
+        parts = _parts(pa, table.column(name), field.type) if name in known else []
+        if not parts:
+            what = "lists of different lengths" if name in known else f"{field.type}, not numbers"
+            findings.append(Finding("note", "not-read", f"column {name!r} holds {what}; it was left out"))
+            unread[name] = ""
+        meta: dict[bytes, bytes] = field.metadata or {}
+        unit = (meta.get(b"unit") or meta.get(b"units") or b"").decode("utf-8", "replace")
+        unit = "s" if pa.types.is_temporal(field.type) else unit
+        columns += [Column(name + suffix, values, unit) for suffix, values in parts]
+        insist_on_columns(path, len(columns))
     return Table("parquet", tuple(columns), findings=tuple(findings), unread=unread)
 
 
-def _numbers(pa: Any, column: Any, kind: Any) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+def _insist_on_size(path: Path, metadata: Any, names: set[str]) -> None:
+    """Refuse more values than may be read, by the counts that the file declares: runs of one value take no space."""
+    count = 0
+    for i in range(metadata.num_row_groups):
+        group = metadata.row_group(i)
+        for j in range(group.num_columns):
+            leaf = group.column(j)
+            if str(leaf.path_in_schema) in names or _root(str(leaf.path_in_schema), names):
+                count += max(int(leaf.num_values), int(group.num_rows))
+    insist_on_values(path, count)
+
+
+def _root(path: str, names: set[str]) -> bool:
+    """Whether a leaf such as ``observation.state.list.element`` belongs to one of the columns."""
+    return any(path.startswith(f"{name}.") for name in names)
+
+
+def _element(pa: Any, kind: Any) -> Any:
+    """The type of the values of a list; the type itself of anything else."""
+    types = pa.types
+    if types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind):
+        return kind.value_type
+    return kind
+
+
+def _is_known(pa: Any, kind: Any) -> bool:
+    types = pa.types
+    return (
+        types.is_timestamp(kind) or types.is_duration(kind) or types.is_time(kind) or types.is_boolean(kind)
+        or types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind)
+    )  # fmt: skip
+
+
+def _parts(pa: Any, column: Any, kind: Any) -> list[tuple[str, Array]]:
+    """A column's numbers; of lists of one length those of each place. Nothing if the lengths differ."""
+    element = _element(pa, kind)
+    if element is kind:
+        return [("", _numbers(pa, column, kind))]
+    compute: Any = importlib.import_module("pyarrow.compute")
+    lengths = compute.unique(compute.list_value_length(column)).drop_null().to_pylist()
+    if len(lengths) != 1 or not lengths[0]:
+        return []
+    width = int(lengths[0])
+    values = _numbers(pa, compute.list_flatten(column), element)
+    rows = np.full((len(column), width), np.nan)
+    rows[np.asarray(column.is_valid())] = values.reshape(-1, width)
+    return [(f"[{i}]", np.ascontiguousarray(rows[:, i])) for i in range(width)]
+
+
+def _numbers(pa: Any, column: Any, kind: Any) -> Array:
     """A column as floats; times in s."""
     types = pa.types
     if types.is_timestamp(kind) or types.is_duration(kind) or types.is_time(kind):
@@ -60,8 +122,6 @@ def _numbers(pa: Any, column: Any, kind: Any) -> np.ndarray[Any, np.dtype[np.flo
         )
     if types.is_boolean(kind):
         column = column.cast(pa.int8())
-    elif not (types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind)):
-        return None
     return np.array(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
 
 

@@ -13,13 +13,16 @@ from typing import Any, cast
 
 import numpy as np
 
+from stickslip.capacity import insist_on_memory, size_text
 from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.readers import profiles
 from stickslip.readers._choose import Choice, choose, meant, parse_mapping
 from stickslip.readers._names import ROLES
+from stickslip.readers._tool_columns import with_tool
 from stickslip.readers.convert import Drive, convert, times_of
-from stickslip.readers.table_columns import Column, Format, Table
+from stickslip.readers.limits import insist_on_columns, size_of
+from stickslip.readers.table_columns import Format, Table
 from stickslip.record import Record
 
 FORMATS = (
@@ -31,11 +34,15 @@ FORMATS = (
     "mdf",
     "tdms",
     "rosbag",
+    "wpilog",
+    "ulog",
     "json_samples",
     "codesys_trace",
     "csv_text",
 )
 """One file a format, asked in this order; text is last, since anything may be text."""
+TIMES_OF_A_TEXT = 4.0
+"""Memory that a text of numbers takes while it is read, in times its size."""
 CHANNELS = ROLES
 """What the columns of a file may be."""
 PER_MILLE = re.compile(r"(?i)(?<![0-9a-f])60(?:77|b2)(?![0-9a-f])")
@@ -71,8 +78,15 @@ def open_table(path: str | os.PathLike[str]) -> Table:
                 raise InputError(f"{source} is a folder, and no ROS bag; give a file in it")
             titles = ", ".join(f.title for f in known)
             raise InputError(f"{source} is in no format that is known; formats are {titles}")
+        size = size_of(source)
+        insist_on_memory(TIMES_OF_A_TEXT * size, f"{source}: {size_text(size)}", "read a part of it")
         with np.errstate(all="ignore"):
             table = found.read(source)
+    except InputError as error:
+        if "\n" not in str(error):
+            raise
+        # Some libraries describe a damaged file in several lines.
+        raise InputError(" ".join(str(error).split())) from None
     except FileNotFoundError:
         raise InputError(f"no file {source}; check the path") from None
     except (OSError, MemoryError) as error:
@@ -81,7 +95,8 @@ def open_table(path: str | os.PathLike[str]) -> Table:
         ) from None
     if not table.columns:
         raise InputError(f"{source} holds no columns of numbers; give a file with samples over time")
-    return table
+    insist_on_columns(source, len(table.columns))
+    return with_tool(table)
 
 
 def _head(source: Path) -> bytes:
@@ -233,11 +248,10 @@ def joined(
         raise InputError(f"{source}: {error}") from None
     taken = {c.name for c in table.columns}
     columns = [
-        Column(
-            c.name if c.name not in taken else f"{c.name} ({source.name})",
-            c.values,
-            c.unit,
-            c.clock if c.clock is not None else clock + origin,
+        replace(
+            c,
+            name=c.name if c.name not in taken else f"{c.name} ({source.name})",
+            clock=c.clock if c.clock is not None else clock + origin,
         )
         for c in other.columns
         if c.name != named and (c.clock is not None or c.values.size == clock.size)

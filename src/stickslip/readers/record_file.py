@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import cast
 
 from stickslip._stream_file import MAGIC
+from stickslip.errors import InputError
+from stickslip.readers.numpy_arrays import insist_on_arrays
 from stickslip.readers.table_columns import Column, Format, Table
 from stickslip.record import Record
 
@@ -26,6 +28,15 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """Time and channels with their units."""
+    with path.open("rb") as file:
+        packed = file.read(len(MAGIC)) != MAGIC
+    if packed:
+        try:
+            insist_on_arrays(path)
+        except InputError:
+            raise
+        except Exception as error:  # zip, zlib and NumPy each raise their own on a damaged file
+            raise InputError(f"{path} is not a record of this package ({error})") from None
     record = Record.load(path)
     columns = [Column("time", record.time, "s")]
     columns += [Column(name, record[name], record.units[name]) for name in record.channels]

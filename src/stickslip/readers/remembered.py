@@ -27,11 +27,11 @@ from stickslip.record import Record
 UNITS = {
     "rated_torque": ("N·m", "NM"), "rated_current": ("A", "A"), "torque_constant": ("N·m/A", "NM_PER_A"),
     "force_constant": ("N/A", "N_PER_A"), "lead": ("mm", "MM"), "sample_time": ("s", "S"), "gear_ratio": ("", "N"),
-    "counts_per_rev": ("", "N"), "side": ("", "motor"),
+    "counts_per_rev": ("", "N"), "pole_pairs": ("", "N"), "side": ("", "motor"),
 }  # fmt: skip
 """Unit in messages, and what help calls the option's value."""
 BEHIND = {
-    "speed": ("counts_per_rev", "gear_ratio", "lead"),
+    "speed": ("counts_per_rev", "pole_pairs", "gear_ratio", "lead"),
     "torque": ("torque_constant", "force_constant", "rated_torque", "rated_current", "gear_ratio", "lead"),
 }
 """Numbers of the drive on which the size of a signal depends."""
@@ -129,6 +129,8 @@ def needed(choices: Sequence[Choice], table: Table, known: Mapping[str, Any]) ->
     out: set[str] = set()
     if {"counts", "count rate"} & set(kinds.values()):
         out.add("counts_per_rev")
+    if "electrical speed" in kinds.values():
+        out.add("pole_pairs")
     if "share" in (kinds.get("motor_torque"), kinds.get("compensation_torque")):
         out.add("rated_torque")
     if "share" in (kinds.get("current"), kinds.get("current_reference")):

@@ -6,6 +6,8 @@ as in sensor_msgs/JointState, are named after them. Times are those of the messa
 
 from __future__ import annotations
 
+import re
+from array import array
 from pathlib import Path
 from typing import Any, cast
 
@@ -13,9 +15,15 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.extras import needed
+from stickslip.readers import _guard
+from stickslip.readers.limits import insist_on_columns, insist_on_values, memory_for, size_of, too_large
 from stickslip.readers.table_columns import Column, Format, Table
 
 MAX_ELEMENTS = 64
+CHECKED = 100_000
+"""Numbers after which memory is checked again."""
+LISTED = re.compile(r"""["']?([^\s"'\[\],]+\.(?:db3|mcap|zstd))\b""")
+"""Files that metadata.yaml names."""
 
 
 def recognise(head: bytes, path: Path) -> bool:
@@ -27,9 +35,39 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """The numeric fields of every topic, with their clock."""
+    if path.is_dir():
+        _insist_on_own_files(path)
+    needed("rosbags.highlevel", "rosbag", "ROS bags need")
+    try:
+        return _guard.call(_read_here, path, limit=_guard.patience(path), memory=memory_for(size_of(path)))
+    except MemoryError:
+        raise too_large(path) from None
+    except _guard.Died as error:
+        raise InputError(f"{path} is damaged: rosbags {error}; check that it is complete") from None
+
+
+def _insist_on_own_files(folder: Path) -> None:
+    """Refuse a bag with a file outside its folder, by a link or by a path in metadata.yaml.
+
+    Raises
+    ------
+    InputError
+    """
+    home = folder.resolve()
+    listed = LISTED.findall((folder / "metadata.yaml").read_text(encoding="utf-8", errors="replace"))
+    names = [*listed, *(p.name for p in folder.iterdir())]
+    for name in names:
+        if not (folder / name).resolve().is_relative_to(home):
+            raise InputError(
+                f"{folder}: the bag's file {name!r} is outside its folder and is not opened; copy it into the folder"
+            )
+
+
+def _read_here(path: Path) -> Table:
     library = needed("rosbags.highlevel", "rosbag", "ROS bags need")
     stores = needed("rosbags.typesys", "rosbag", "ROS bags need")
-    samples: dict[str, tuple[list[float], list[float]]] = {}
+    samples: dict[str, tuple[array[float], array[float]]] = {}
+    count = checked = 0
     try:
         store = stores.get_typestore(stores.Stores.LATEST)
         with library.AnyReader([path], default_typestore=store) as reader:
@@ -37,9 +75,16 @@ def read(path: Path) -> Table:
                 message = reader.deserialize(raw, connection.msgtype)
                 time = _time(message, stamp)
                 for name, value in _fields(message, connection.topic).items():
-                    times, values = samples.setdefault(name, ([], []))
+                    times, values = samples.setdefault(name, (array("d"), array("d")))
                     times.append(time)
                     values.append(value)
+                    count += 2
+                insist_on_columns(path, len(samples))
+                if count >= checked + CHECKED:
+                    insist_on_values(path, count)
+                    checked = count
+    except (InputError, MemoryError):
+        raise
     except Exception as error:  # rosbags raises several kinds on a damaged bag
         raise InputError(
             f"{path} cannot be read as a ROS bag ({type(error).__name__}: {error}); check that it is complete"

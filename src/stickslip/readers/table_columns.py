@@ -28,12 +28,16 @@ class Column:
         As written; empty where the file says none.
     clock : array, shape (n,), or None
         The column's own times in s, where the file gives columns times of their own.
+    channel : str
+        The channel that the format defines it to be, or "none" for a quantity that no channel holds; empty where only
+        the name and the unit indicate it.
     """
 
     name: str
     values: Array
     unit: str = ""
     clock: Array | None = None
+    channel: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +55,8 @@ class Table:
         What was odd about the file.
     unread : mapping of str to str
         Name and first cell of columns that were left out, since they hold neither numbers nor a clock.
+    runs : tuple of int
+        Rows, from 1, at which another record of the same axis starts: tests or episodes one after the other.
     """
 
     format: str
@@ -58,6 +64,7 @@ class Table:
     constants: Mapping[str, float | str] = field(default_factory=dict[str, float | str])
     findings: tuple[Finding, ...] = ()
     unread: Mapping[str, str] = field(default_factory=dict[str, str])
+    runs: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

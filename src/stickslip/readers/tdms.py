@@ -9,6 +9,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.extras import needed
+from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Column, Format, Table
 
 
@@ -22,8 +23,11 @@ def read(path: Path) -> Table:
     library = needed("nptdms", "tdms", "TDMS files need")
     columns: list[Column] = []
     try:
-        for group in library.TdmsFile.read(path).groups():
-            for channel in group.channels():
+        with library.TdmsFile.open(path) as file:
+            channels: list[Any] = [channel for group in file.groups() for channel in group.channels()]
+            insist_on_columns(path, len(channels))
+            insist_on_values(path, sum(len(channel) for channel in channels))
+            for channel in channels:
                 values: Any = np.asarray(channel[:])
                 if values.dtype.kind in "biuf" and values.size:
                     unit = str(channel.properties.get("unit_string", ""))
@@ -32,6 +36,8 @@ def read(path: Path) -> Table:
                             str(channel.name), values.astype(np.float64), unit, _clock(channel, values.size)
                         )
                     )
+    except InputError:
+        raise
     except Exception as error:  # npTDMS raises several kinds on a damaged file
         raise InputError(
             f"{path} cannot be read as TDMS ({type(error).__name__}: {error}); export it again"

@@ -41,7 +41,7 @@ TAKEN_BY = {
 }
 RECORDS = {
     ".csv", ".tsv", ".txt", ".dat", ".log", ".asc", ".mat", ".h5", ".hdf5", ".parquet", ".npy", ".npz", ".tdms",
-    ".mf4", ".mdf", ".bag", ".mcap", ".db3",
+    ".mf4", ".mdf", ".bag", ".mcap", ".db3", ".wpilog", ".ulg",
 }  # fmt: skip
 REPORTS = {".html", ".htm", ".png", ".svg", ".pdf"}
 

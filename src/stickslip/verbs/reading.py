@@ -33,6 +33,7 @@ SIGNALS = (
 )  # fmt: skip
 NUMBERS = (
     "counts_per_rev", "rated_torque", "rated_current", "torque_constant", "force_constant", "gear_ratio", "lead",
+    "pole_pairs",
 )  # fmt: skip
 ARRAYS = (*SIGNALS, "units")
 """What says the signals themselves."""
@@ -58,7 +59,7 @@ class Reading(TypedDict, total=False):
 
     Numbers of the data sheet, where units need them: `counts_per_rev`, `rated_torque` (N·m), `rated_current` (A),
     `torque_constant` (N·m/A) or a linear motor's `force_constant` (N/A), `gear_ratio`, `side` ("motor" or "load"),
-    `lead` (m a revolution).
+    `lead` (m a revolution), `pole_pairs` (for speeds in eRPM).
 
     Part of the log: `start` and `end` (s), `rows` (first, last; counted from 1, both included, also as "A:B"),
     `leave_out` (such ranges, or "spikes"), `unwrap` (count the position on where it jumps by a turn).
@@ -92,6 +93,7 @@ class Reading(TypedDict, total=False):
     gear_ratio: float | None
     side: Literal["motor", "load"] | None
     lead: float | None
+    pole_pairs: float | None
     start: float | None
     end: float | None
     rows: str | tuple[int, int] | None

@@ -11,11 +11,12 @@ from typing import Any, cast
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
+from stickslip.readers.limits import memory_for
 from stickslip.web.asking import Refused, Table, body, number, text
 from stickslip.web.jobs import Job
 from stickslip.web.projects import Item, Project, words
 from stickslip.web.site import Site
-from stickslip.web.uploads import memory_for, received, suffix_of, time_for
+from stickslip.web.uploads import received, suffix_of, time_for
 
 NUMBERS = (
     "counts_per_rev",
@@ -25,6 +26,7 @@ NUMBERS = (
     "force_constant",
     "gear_ratio",
     "lead",
+    "pole_pairs",
     "sample_time",
 )
 

@@ -57,14 +57,6 @@ async def received(request: Request, path: Path, most: int) -> tuple[int, str]:
     return size, digest.hexdigest()
 
 
-def memory_for(size: int) -> int:
-    """Bytes that reading a file may take: an archive that grows beyond all measure is refused by this.
-
-    A text of numbers takes about four times its size while it is read and examined; a short one next to nothing.
-    """
-    return 900 * 2**20 + 12 * size
-
-
 def time_for(size: int) -> float:
     """s that reading a file may take."""
     return 240.0 + 240.0 * size / 100e6

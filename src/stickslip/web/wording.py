@@ -13,6 +13,7 @@ OPTIONS = {
     "--counts-per-rev": f"the counts a revolution {FORM}", "--rated-torque": f"the rated torque {FORM}",
     "--rated-current": f"the rated current {FORM}", "--torque-constant": f"the torque constant {FORM}",
     "--force-constant": f"the force constant {FORM}",
+    "--pole-pairs": f"the pole pairs {FORM}",
     "--gear-ratio": f"the gear ratio {FORM}", "--lead": f"the lead of the screw {FORM}",
     "--sample-time": f"the time between rows {FORM}", "--leave-out": "“Leave this part out”",
     "--unwrap": "“Count the position on”", "--inertia": "“Inertia” under “Options”",

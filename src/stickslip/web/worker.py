@@ -16,26 +16,12 @@ import warnings
 from collections.abc import Callable
 from typing import Any, TextIO
 
+from stickslip.capacity import limit_memory
 from stickslip.errors import StickslipError
 from stickslip.in_python import with_options
 
 Said = Callable[[dict[str, Any]], None]
 """Sends one line to the server."""
-
-
-def limit_memory(most: int) -> None:
-    """Let this process hold that many bytes; where the system cannot, nothing is limited.
-
-    What counts is memory that can be written: libraries reserve addresses far beyond what they ever use.
-    """
-    try:
-        import resource
-    except ModuleNotFoundError:  # Windows
-        return
-    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
-    resource.setrlimit(
-        resource.RLIMIT_DATA, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard)
-    )
 
 
 def plain(value: Any) -> Any:

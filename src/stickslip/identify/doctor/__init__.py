@@ -36,7 +36,7 @@ from stickslip.in_python import in_python
 from stickslip.readers.cut import range_words, taken
 from stickslip.record import Record
 
-FINAL = ("too-short", "no-clock")
+FINAL = ("too-short", "no-clock", "too-small")
 """Errors after which nothing can be computed."""
 ERRORS = (
     *FINAL, "ambiguous-column", "backward-time", "duplicate-time", "missing-column", "mixed-units", "nan",
@@ -45,7 +45,7 @@ ERRORS = (
 )  # fmt: skip
 """Codes of what may make a record unusable, those of its reading among them."""
 FIRST: tuple[Callable[[View], Iterator[Finding]], ...] = (
-    excitation.channels, signals.missing, timing.ascending, timing.sampling,
+    excitation.channels, signals.missing, signals.too_small, timing.ascending, timing.sampling,
 )  # fmt: skip
 """What may be asked of any record; the other checks need enough usable rows."""
 CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
@@ -177,8 +177,10 @@ def examine(
     findings = [Finding.from_data(f) for f in reading.get("findings", [])]
     # Absurd numbers overflow; whatever comes of them compares as false.
     with np.errstate(all="ignore"):
-        enough = view.time.size >= timing.FEWEST
-        for check in CHECKS if enough else FIRST:
+        for check in FIRST:
+            findings += check(view)
+        enough = view.time.size >= timing.FEWEST and not any(f.code == "too-small" for f in findings)
+        for check in CHECKS[len(FIRST) :] if enough else ():
             findings += check(view)
         if enough and not any(f.code == "never-moved" for f in findings):
             findings += excitation.reversed_and_slow(view, stribeck_velocity)

@@ -42,12 +42,15 @@ def channels(view: View) -> Iterator[Finding]:
             maybe = view.unused_drives
             listed = ", ".join(repr(name) for name in maybe[:4])
             which = f" (not used, with a unit that may say it: {listed})" if maybe else ""
-            yield Finding(
-                "warning",
-                "missing-column",
-                "there is no torque, force or current: only a machine model can replace it",
-                remedy=f"if a column{which} holds it, say --map torque=COLUMN:{view.effort}",
-            )
+            mapped = f"if a column{which} holds it, say --map torque=COLUMN:{view.effort}"
+            message = "there is no torque, force or current: only a machine model can replace it"
+            if view.has("voltage"):
+                message = "there is a voltage and no torque, force or current"
+                mapped = (
+                    "identify computes the torque from the voltage with --resistance OHM and --torque-constant "
+                    f"NM_PER_A; {mapped}"
+                )
+            yield Finding("warning", "missing-column", message, remedy=mapped)
 
 
 def moved(view: View) -> Iterator[Finding]:

@@ -38,6 +38,8 @@ LOST = 1.5
 """Times from row to row, from which on a row is missing."""
 LEAPS = 99.0
 """Percentile of the changes of torque that a leap exceeds."""
+SMALLEST = 1e-12
+"""rad, N·m, A, ...: below what encoders (nrad), torque sensors (nN·m) and current sensors of axes resolve."""
 WORTH_A_WORD = 1e-4
 """Part of the fast speed below which that speed is of no interest: the step is the file's rounding, no encoder's."""
 
@@ -59,6 +61,20 @@ def missing(view: View) -> Iterator[Finding]:
             yield Finding("error", "nan", message, where, f"log it again{without}")
         else:
             yield Finding("warning", "nan", message, where, "these rows are left out")
+
+
+def too_small(view: View) -> Iterator[Finding]:
+    """Signals so small that no axis has them: their squares and quotients leave the range of numbers."""
+    for channel in ("position", "velocity", "motor_torque", "friction_torque", "current", "voltage"):
+        if not view.has(channel):
+            continue
+        values = np.abs(view.record[channel])
+        largest = float(np.max(values, initial=0.0, where=is_number(values)))
+        if 0.0 < largest < SMALLEST:
+            unit = view.record.units[channel]
+            message = f"{channel} never exceeds {largest:.3g} {unit}, which no axis has"
+            remedy = f"state its unit, such as {view.mapped(channel, unit)}, or log it again"
+            yield Finding("error", "too-small", message, remedy=remedy)
 
 
 def saturated(view: View) -> Iterator[Finding]:

@@ -5,7 +5,7 @@ import { complaint, field, fill, h, values } from "../dom.js";
 const CHANNELS = ["time", "position", "position_reference", "velocity", "velocity_reference", "motor_torque", "current", "voltage", "supply",
   "friction_torque", "sensor_torque", "compensation_torque", "load", "temperature"];
 const NUMBERS = [["sample_time", "Time between rows (s), where the file has no times"], ["counts_per_rev", "Counts a revolution"], ["rated_torque", "Rated torque (N·m)"],
-  ["rated_current", "Rated current (A)"], ["torque_constant", "Torque constant (N·m/A)"], ["force_constant", "Force constant of a linear motor (N/A)"], ["gear_ratio", "Gear ratio"], ["lead", "Lead of the screw (m a revolution)"]];
+  ["rated_current", "Rated current (A)"], ["torque_constant", "Torque constant (N·m/A)"], ["force_constant", "Force constant of a linear motor (N/A)"], ["gear_ratio", "Gear ratio"], ["pole_pairs", "Pole pairs, for speeds in eRPM"], ["lead", "Lead of the screw (m a revolution)"]];
 
 export function mapping(log, again) {
   const state = h("div");

@@ -1,0 +1,85 @@
+"""How much is read from one file: bounds on its columns, its lines, and the values that it unpacks to.
+
+A small compressed file may unpack to more than the machine's memory. Readers therefore compare the sizes that a file
+declares with these bounds before they unpack it, on the command line, in Python and on the page alike.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from stickslip.capacity import free_memory, size_text
+from stickslip.errors import InputError
+
+MAX_COLUMNS = 5_000
+"""Columns of a file: a car's measurement file has a few thousand channels."""
+LONGEST_LINE = 32 * MAX_COLUMNS
+"""Characters of a line of text: `MAX_COLUMNS` numbers with all their digits and delimiters."""
+COPIES = 3
+"""Copies of a value that exist at the same time while a file is read: as stored, as a column, as a channel."""
+
+
+def memory_for(size: int) -> int:
+    """Bytes that reading a file of `size` bytes may take.
+
+    A text of numbers takes about four times its size while it is read and examined; a short one next to nothing.
+    """
+    return 900 * 2**20 + 12 * size
+
+
+def too_large(path: Path) -> InputError:
+    """The error of a file that takes more memory than `memory_for` while it is read, whatever it declares."""
+    size = size_of(path)
+    return InputError(
+        f"{path} has {size_text(size)} and needs more than {size_text(memory_for(size))} of memory to read; save it "
+        "without compression, or export only the signals and the rows that you need"
+    )
+
+
+def size_of(path: Path) -> int:
+    """Bytes of a file, or of all files in a folder."""
+    if path.is_dir():
+        return sum(p.stat().st_size for p in path.rglob("*") if p.is_file())
+    return path.stat().st_size
+
+
+def insist_on_values(path: Path, count: float) -> None:
+    """Refuse a file with more values than reading a file of its size may take.
+
+    Parameters
+    ----------
+    path : Path
+    count : float
+        Numbers in all columns.
+
+    Raises
+    ------
+    InputError
+    """
+    size = size_of(path)
+    needed = 8.0 * COPIES * count
+    if needed <= min(memory_for(size), free_memory()):
+        return
+    free = free_memory()
+    if needed > free:
+        bound, remedy = f"{size_text(free)} are free", "export only the signals and the rows that you need"
+    else:
+        bound = f"at most {size_text(memory_for(size))} are used for a file of this size"
+        remedy = "save it without compression, or export only the signals and the rows that you need"
+    raise InputError(
+        f"{path} has {size_text(size)} and unpacks to {count:.3g} numbers, which need {size_text(needed)} of memory; "
+        f"{bound}; {remedy}"
+    )
+
+
+def insist_on_columns(path: Path | str, count: int) -> None:
+    """Refuse more columns than `MAX_COLUMNS`.
+
+    Raises
+    ------
+    InputError
+    """
+    if count > MAX_COLUMNS:
+        raise InputError(
+            f"{path} has {count} columns; at most {MAX_COLUMNS} are read: export only the signals that you need"
+        )
