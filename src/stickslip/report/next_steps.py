@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stickslip.control.linear import Cascade, Gains
-from stickslip.control.own_loop import USUAL_TIME
+from stickslip.control.own_loop import REFERENCE_VELOCITY, USUAL_TIME
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
 from stickslip.identify.regression.regression import Regression
@@ -18,7 +18,7 @@ from stickslip.record import Record, encoder_step, row_period
 from stickslip.report.after_a_map import after_a_map
 from stickslip.report.sliding_torque import beaten, sliding_of
 
-OWN_LOOP = (*Gains._fields, *Cascade._fields, "filter", "limit")
+OWN_LOOP = (*Gains._fields, *Cascade._fields, "filter", "limit", REFERENCE_VELOCITY)
 """Numbers of an identification's --loop that a recommendation's has too."""
 OPTIONS = "  # with the options of this run"
 EXPERIMENTS = {

@@ -34,7 +34,7 @@ from stickslip.verbs.examiner import Examiner
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, named, open_log
 
-Loops = str | Mapping[str, float] | Sequence[str | Mapping[str, float]] | None
+Loops = str | Mapping[str, float | str] | Sequence[str | Mapping[str, float | str]] | None
 
 
 @arguments_checked
@@ -304,7 +304,7 @@ def loops_of(loop: Loops, count: int) -> list[str]:
         raise InputError(
             f"--loop: {loop!r} names no gain; give them, such as --loop kp=8,kd=0.08, or leave it out"
         )
-    texts = [x if isinstance(x, str) else ",".join(f"{k}={float(v)!r}" for k, v in x.items()) for x in every]
+    texts = [x if isinstance(x, str) else ",".join(f"{k}={v if isinstance(v, str) else repr(float(v))}" for k, v in x.items()) for x in every]
     return texts if len(texts) > 1 else texts * count
 
 
