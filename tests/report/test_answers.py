@@ -23,7 +23,8 @@ from stickslip.record import Record
 from stickslip.report.answers import answers_of, either_way, evidence, meaning_of, one_number_each
 from stickslip.report.axis_pictures import pictures_of
 from stickslip.report.identified import Source, rendered, symbol, tally
-from stickslip.report.next_steps import EXPERIMENTS, MOTIONS, counts_of, forward, lacking
+from stickslip.identify.needed_motions import EXPERIMENTS, MOTIONS
+from stickslip.report.next_steps import counts_of, forward, lacking
 from stickslip.report.result_text import result_lines, result_lines_in_python
 from stickslip.report.sliding_torque import over_all_rows, sliding_of
 from stickslip.report.torque_pictures import friction_points, with_gaps

@@ -39,7 +39,11 @@ class Settings(NamedTuple):
     clock: Annotated[float, Par("-", "", "1 where samples make the time, 0 where the caller gives it")]
     difference: Annotated[
         float,
-        Par("-", "", "1: reference velocity formed as the difference of reference positions; 0: as it is given"),
+        Par(
+            "-",
+            "",
+            "1: reference velocity formed as the difference of reference positions; 0: as it is given",
+        ),
     ]
 
 

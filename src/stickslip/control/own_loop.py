@@ -25,6 +25,14 @@ USUAL_TIME = 1e-3
 CASCADE_ONLY = tuple(name for name in Cascade._fields if name not in Gains._fields)
 
 
+def loop_text(given: str | Mapping[str, float | str]) -> str:
+    """Return a loop's description as the command line has it."""
+    if isinstance(given, str):
+        return given
+    words = {name: x if isinstance(x, str) else repr(float(x)) for name, x in given.items()}
+    return ",".join(f"{name}={word}" for name, word in words.items())
+
+
 def split_loop(
     given: str | Mapping[str, float | str],
 ) -> tuple[dict[str, float], ReferenceVelocity | None]:

@@ -39,7 +39,8 @@ class Identified:
     motion : str
         "rotary" or "linear".
     data : tuple of mapping
-        ``file``, ``sha256``, ``rows``, ``sample_time`` (s, between its rows) of every record.
+        ``file``, ``sha256``, ``rows``, ``sample_time`` (s, between its rows), ``position_step`` (rad or m, of its
+        encoder or its digits) of every record.
     misfit : mapping of str to float
     trajectory : Motion or None
         The motion of the record that it was identified on.
@@ -73,12 +74,20 @@ class Identified:
     @property
     def sampled(self) -> tuple[float, str]:
         """Shortest time between rows of its records, s, and the file of that record; 0 and "" where it is not told."""
-        told = [
-            (float(period), str(d.get("file", "")))
+        return min(self._of_records("sample_time"), default=(0.0, ""))
+
+    @property
+    def position_step(self) -> tuple[float, str]:
+        """Coarsest step of the positions in its records, rad (m), and that record's file; 0 and "" if none shows."""
+        return max(self._of_records("position_step"), default=(0.0, ""))
+
+    def _of_records(self, name: str) -> list[tuple[float, str]]:
+        """A positive number of every record that has it, each with the record's file."""
+        return [
+            (float(value), str(d.get("file", "")))
             for d in self.data
-            if isinstance(period := d.get("sample_time"), (int, float)) and 0.0 < period < math.inf
+            if isinstance(value := d.get(name), (int, float)) and 0.0 < value < math.inf
         ]
-        return min(told, default=(0.0, ""))
 
     @property
     def law_estimates(self) -> tuple[tuple[Estimate, ...], Array]:
