@@ -23,10 +23,7 @@ MOSTLY, PARTLY = 0.5, 0.15
 """Of the error: what a lag makes beyond that is most of it; and from where on it is worth a word."""
 BETTER_AT_MOTOR = 5.0
 """The second where friction is simulated at the load, and may act at the motor: so it held in `benchmarks/belts.py`."""
-UNSURE = (
-    f"more than {100.0 / ALLOWANCE:.0f} % of the error left, so that no reduction is certain ({ALLOWANCE:g} times as "
-    "much is allowed for what is not simulated)"
-)
+UNSURE = f"no certain reduction (more than {100.0 / ALLOWANCE:.0f} % left)"
 """Why a safe setting is not worth it."""
 
 
@@ -148,15 +145,13 @@ def _stiff_feedback(candidates: Sequence[Candidate]) -> Iterator[str]:
     """With which laws and deadbands feedback of all of the friction is not safe."""
     whole = [c for c in candidates if c.setting.kind == "feedback" and c.setting.gain == 1.0]
     several = len({c.setting.deadband for c in whole}) > 1
-    said = [
-        f"of law {c.setting.law!r}"
-        + (f" with {'a' if c.setting.deadband else 'no'} deadband" if several else "")
-        + f" ({', '.join(c.unsafe)})"
-        for c in whole
-        if c.unsafe
-    ]
-    if said:
-        yield f"Not safe at gain 1: feedback {', feedback '.join(said)}."
+    by_reason: dict[str, list[str]] = {}
+    for c in (c for c in whole if c.unsafe):
+        which = f" with {'a' if c.setting.deadband else 'no'} deadband" if several else ""
+        by_reason.setdefault(", ".join(c.unsafe), []).append(f"law {c.setting.law!r}{which}")
+    if by_reason:
+        said = "; ".join(f"{', '.join(laws)} ({why})" for why, laws in by_reason.items())
+        yield f"Feedback at gain 1 is not safe for {said}."
 
 
 def _intervals(found: Identified, unknown: Sequence[str]) -> Iterator[str]:

@@ -147,6 +147,8 @@ def recommend(
         (), drive, rung, j, beside, hunts, better_than_simulated(drive.machine, found.train), choice.inertia_alone,
         choice.friction,
     )  # fmt: skip
+    if chosen is None and result.instead is None:
+        result = replace(result, why_none=why_refused(found, result.candidates, bench, others))
     weak = weak_on([*bench.plants, *others.plants[1:]], drive)
     notes = [
         *sampled_as(drive, chosen, found.motion == "linear"), *on_motion(drive, found.unit("rad")),
@@ -158,13 +160,12 @@ def recommend(
 
 
 def _reasons(found: Identified, result: Recommendation, bench: Bench, others: Bench) -> Iterator[str]:
-    """What the error left of the setting that is switched on depends on; or the one reason why nothing is, or why no
-    friction is compensated."""
-    chosen = result.chosen
-    if result.instead is not None:
-        return
+    """What the error left by the recommended setting depends on; or the one reason why nothing is recommended, or why
+    no friction is compensated."""
+    chosen = result.switched_on
+    if result.why_none:
+        yield f"No compensator is recommended: {result.why_none}."
     if chosen is None:
-        yield f"No compensator is recommended: {why_refused(found, result.candidates, bench, others)}."
         return
     yield from by_attribute(found, chosen, others.plants)
     if not chosen.setting.compensates:

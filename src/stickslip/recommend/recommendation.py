@@ -56,6 +56,8 @@ class Recommendation:
     friction : Candidate or None
         The best setting that compensates friction, on the same axes; it is not the chosen one where it adds nothing to
         the inertia feedforward alone. None where there is none.
+    why_none : str
+        The one reason why no compensator is recommended, and what to do; empty where one is.
     """
 
     chosen: Candidate | None
@@ -75,6 +77,7 @@ class Recommendation:
     better: float = BETTER
     inertia_alone: Candidate | None = None
     friction: Candidate | None = None
+    why_none: str = ""
 
     @property
     def instead(self) -> Beside | None:
@@ -139,5 +142,5 @@ class Recommendation:
             "linear_alone_rings": self.rings, "drive": self.drive.as_dict(),
             "candidates": [c.as_dict() for c in self.candidates],
             "compensators": [b.as_dict() for b in self.beside],
-            "instead": self.instead.label if self.instead else None,
+            "instead": self.instead.label if self.instead else None, "why_none": self.why_none,
         }  # fmt: skip

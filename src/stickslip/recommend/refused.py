@@ -6,6 +6,7 @@ most axes. It is run on every sampled axis, and the attribute that separates the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from stickslip.identify.identified_file import Identified
@@ -13,7 +14,6 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.recommend.candidate_run import AT_REST, IN_MOTION, LARGER, LEFT, ROUGH_MOTION
 from stickslip.recommend.candidates import AFTER_A_PUSH, WORTH, Bench, Candidate, Setting
 from stickslip.recommend.long_rest import HUNTS
-from stickslip.recommend.notes import UNSURE
 from stickslip.recommend.recommendation import ALLOWANCE
 from stickslip.recommend.separation import separate
 
@@ -61,12 +61,14 @@ def why_refused(found: Identified, candidates: Sequence[Candidate], bench: Bench
         return f"the closest candidate ({name}) {said}; {remedy_of(said)}"
     kinds = [word for u in unsafe for word in u]
     decided = max(kinds, key=kinds.count) if kinds else ""
-    what = decided or UNSURE
+    what = decided or f"more than {100.0 / ALLOWANCE:.0f} % of the error left"
     worst = max(e for e, b in zip(errors, bad, strict=True) if b)
-    left = "" if worst == float("inf") else f" (up to {100.0 * worst:.0f} % of the error left)"
+    left = "" if math.isinf(worst) else f" (up to {100.0 * worst:.0f} % of the error left)"
+    if not decided:
+        left += f", and {ALLOWANCE:g} times as much is allowed for what is not simulated"
     said = f"the closest candidate ({name}) is refused on {sum(bad)} of {len(bad)} axes: {what}{left}"
     if (split := separate(found, plants[1:], bad[1:])) is not None:
-        return f"{said}; {split.words}: {split.attribute.remedy}"
+        return f"{said}; {split.words}: {split.remedy}"
     remedy = remedy_of(decided) if decided else NOT_FRICTION
     if all(bad):
         return f"{said}; {remedy}"
@@ -104,7 +106,7 @@ def _guarded(best: Candidate) -> str:
 def _on_one(best: Candidate) -> str:
     """What it does on the best estimate."""
     error = best.errors[0]
-    left = "" if error == float("inf") else f", {100.0 * error:.1f} % of the error left"
+    left = "" if math.isinf(error) else f", {100.0 * error:.1f} % of the error left"
     if best.unsafe:
         return f"{best.unsafe[0]}{left}; {remedy_of(best.unsafe[0])}"
     return f"more than {100.0 * WORTH:g} % of the error left{left}; {NOT_FRICTION}"

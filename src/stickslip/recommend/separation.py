@@ -71,10 +71,26 @@ class Separation:
         """The axes on one side of the threshold, in words."""
         a = self.attribute
         if a.name == REFERENCE_VELOCITY:
-            how = "as the difference of two reference positions" if above else "of the instant"
-            return f"whose drive has a reference velocity {how}"
+            return f"whose drive forms its reference velocity {self._formed(above)}"
         unit = f" {a.unit}" if a.unit else ""
         return f"with {a.name} {'above' if above else 'below'} {self.bound:.3g}{unit}"
+
+    @property
+    def remedy(self) -> str:
+        """What the user can do."""
+        if self.attribute.name != REFERENCE_VELOCITY:
+            return self.attribute.remedy
+        good = "instant" if self.above else "difference"
+        return (
+            f"if your drive forms it {self._formed(not self.above)}, state --reference-velocity {good} (Python: "
+            f"reference_velocity={good!r}); else set the drive to it"
+        )
+
+    def _formed(self, difference: bool) -> str:
+        """How a drive forms its reference velocity, in words."""
+        return (
+            "as the difference of two reference positions" if difference else "at the instant of the sample"
+        )
 
     @property
     def words(self) -> str:
@@ -102,8 +118,7 @@ def attributes_of(found: Identified) -> Callable[[Plant], dict[str, tuple[Attrib
             ("current loop bandwidth", "Hz", plant.bandwidth,
              "describe the drive with --machine, whose amplifier has the bandwidth"),
             (REFERENCE_VELOCITY, "", float(plant.backward),
-             "state how the drive forms it, --reference-velocity difference or instant (Python: reference_velocity=), "
-             "or set the drive to the other one"),
+             ""),
             ("torque over the position", f"{torque} RMS", plant.unmodelled,
              "identify and compensate the torque over the position first (stickslip identify --position-map)"),
         ]  # fmt: skip
@@ -182,7 +197,9 @@ def dependence(
     factor : float
     """
     left = np.array(errors)
-    split = separate(found, plants, [bool(x > np.median(left)) for x in left])
+    middle = np.median(left)
+    larger = left >= middle if np.any(left < middle) else left > middle
+    split = separate(found, plants, larger.tolist())
     if split is None:
         return None
     values = attributes_of(found)

@@ -62,7 +62,8 @@ class RecommendationResult:
                 f"{self.recommendation.instead.label} is recommended, which is a whole controller; take controller"
             )
         if self.recommendation.model is None:
-            raise InputError(f"no compensator is recommended: {'; '.join(self.notes)}")
+            why = in_python(self.recommendation.why_none, "recommend")
+            raise InputError(f"no compensator is recommended: {why}")
         return self.recommendation.model
 
     @property
