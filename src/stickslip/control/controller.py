@@ -319,7 +319,7 @@ class Controller(Composed):
         if not self.is_short:
             return {"controller": self.as_dict()}
         helper = self.compensator
-        stated = {"reference_velocity": self.reference_velocity} if self.reference_velocity else {}
+        stated = {"reference_velocity": self.reference_velocity or "instant"} if self.sample_time else {}
         return {"gains": self.numbers(), **({"compensator": helper.as_dict()} if helper else {}), **stated}
 
 

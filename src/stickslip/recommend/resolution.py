@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.machine import Machine
 from stickslip.record import counts_of_step
@@ -24,8 +27,18 @@ def encoder_for(
         At hand.
     controller : float
         Counts that the controller of the user's file or object has; 0: none.
+
+    Raises
+    ------
+    InputError
+        If the given number is no number of counts.
     """
     if given is not None:
+        if not (given == 0.0 or 1.0 <= given < math.inf):
+            raise InputError(
+                f"--counts-per-rev {given:g} must be at least 1 and finite, or 0 for exact positions; leave it out to "
+                "take the resolution of the record"
+            )
         return given, "as given"
     if machine is not None:
         return machine.encoder.counts, f"that of the machine {machine.name}"

@@ -196,6 +196,8 @@ def dependence(
         Error left on each.
     factor : float
     """
+    if not errors:
+        return None
     left = np.array(errors)
     middle = np.median(left)
     larger = left >= middle if np.any(left < middle) else left > middle

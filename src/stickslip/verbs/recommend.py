@@ -322,7 +322,7 @@ def one_of(
     """
     if given is not None and own is not None and given != own:
         raise InputError(
-            f"--reference-velocity {given}: {owner} has reference_velocity = {own}; leave one of them out"
+            f"--reference-velocity {given}, and {owner} states {own}; leave one of them out"
         )
     return given or own
 
