@@ -86,7 +86,9 @@ def test_files_keep_it(tmp_path: Path) -> None:
         read = read_controller(file, 1e-3)
         assert read.reference_velocity == kind
         assert tables_of(read)["controller"]["reference_velocity"] == kind
-        assert eval(repr(controller), {"Controller": Controller, "Cascade": Cascade}).reference_velocity == kind
+        assert (
+            eval(repr(controller), {"Controller": Controller, "Cascade": Cascade}).reference_velocity == kind
+        )
     file.write_text(file.read_text().replace("instant", "instantaneous"))
     with pytest.raises(ConfigError, match=r"reference_velocity = .instantaneous. is not known"):
         read_controller(file, 1e-3)

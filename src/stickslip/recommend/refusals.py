@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from stickslip.analyse.wording import ends
@@ -58,6 +60,12 @@ def refuse_unknown(found: Identified) -> None:
     ------
     InputError
     """
+    for e in found.estimates:
+        if any(math.isnan(x) for x in (e.value, e.lower, e.upper)):
+            raise InputError(
+                f"{found.path}: the estimate of {e.name} is {e.value:g} [{e.lower:g}, {e.upper:g}], from which no axis "
+                "can be sampled; identify the axis again"
+            )
     levels = [e for e in found.law_estimates[0] if e.unit in ("N·m", "N")]
     if levels and not any(e.identified or 0.0 < e.upper <= WITHIN * e.lower for e in levels):
         listed = ", ".join(

@@ -321,9 +321,7 @@ def one_of(
         If both differ.
     """
     if given is not None and own is not None and given != own:
-        raise InputError(
-            f"--reference-velocity {given}, and {owner} states {own}; leave one of them out"
-        )
+        raise InputError(f"--reference-velocity {given}, and {owner} states {own}; leave one of them out")
     return given or own
 
 
