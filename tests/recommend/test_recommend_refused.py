@@ -111,6 +111,16 @@ def test_the_sampled_attribute_that_separates_the_refused_axes_is_named(refused,
     assert split.remedy
 
 
+def test_two_axes_are_too_few_to_name_an_attribute_and_four_are_enough() -> None:
+    found = identified(0.1, 0.2)
+    plants = sorted(list(plants_of(found, INERTIA, 20, 0))[1:], key=lambda p: p.inertia)
+    few, enough = ([i < count for i in range(20)] for count in (2, 4))
+    assert separate(found, plants, few) is None
+    split = separate(found, plants, enough)
+    assert split is not None
+    assert split.words.startswith("they are 4 of the 4 axes with inertia below ")
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_chance_names_no_attribute(seed: int) -> None:
     found = identified(0.1, 0.2)
@@ -139,7 +149,7 @@ def test_the_error_left_names_the_attribute_that_it_depends_on() -> None:
     errors = (0.1, *(0.1 + 0.001 * i if p.backward else 0.4 for i, p in enumerate(plants[1:])))
     chosen = Candidate(Setting("coulomb", "feedforward", 0.8), errors, ())
     (said,) = by_attribute(found, chosen, plants)
-    assert said.startswith("The error left depends most on the reference velocity: 40 % on half")
+    assert said.startswith("The error left depends most on reference velocity: 40 % on half")
     assert "--reference-velocity difference" in said
     alike = Candidate(chosen.setting, (0.1,) * len(plants), ())
     assert not list(by_attribute(found, alike, plants))

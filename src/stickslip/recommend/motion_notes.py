@@ -51,7 +51,7 @@ def by_attribute(found: Identified, chosen: Candidate | None, plants: Sequence[R
     if most is not None:
         split, worse, better = most
         yield (
-            f"The error left depends most on the {split.attribute.name}: {100.0 * worse:.2g} % on half of the sampled "
+            f"The error left depends most on {split.attribute.name}: {100.0 * worse:.2g} % on half of the sampled "
             f"axes {split.side(split.above)}, {100.0 * better:.2g} % on half of those {split.side(not split.above)}. "
             f"To know it: {split.remedy}."
         )

@@ -153,8 +153,8 @@ def recommend(
     notes = [
         *sampled_as(drive, chosen, found.motion == "linear"), *on_motion(drive, found.unit("rad")),
         *axes_left_out(bench, others, found), *seconds_meant(drive), *hardly_damped_where_late(found, drive, j),
-        *lag_of(bench.plants[0], first, linear, drive), *notes_on(found, result, weak),
-        *(() if rung else unsure_at_rest(found, linear)), *_reasons(found, result, bench, others),
+        *lag_of(bench.plants[0], first, linear, drive), *(() if rung else unsure_at_rest(found, linear)),
+        *_reasons(found, result, bench, others), *notes_on(found, result, weak),
     ]  # fmt: skip
     return replace(result, notes=tuple(notes))
 

@@ -159,8 +159,10 @@ def separate(found: Identified, plants: Sequence[RigidAxis], refused: Sequence[b
         return None
     best = max(found_by, key=lambda name: found_by[name][0])
     distance, bound, above = found_by[best]
-    critical = math.sqrt(0.5 * math.log(2.0 * len(columns) / LEVEL) * (n + m) / (n * m))
-    if distance < min(critical, 1.0):
+    chance = 2.0 * math.exp(-2.0 * distance**2 * n * m / (n + m))
+    if distance == 1.0:  # exact: one threshold separates few axes often by chance
+        chance = min(chance, 2.0 / math.comb(n + m, n))
+    if len(columns) * chance > LEVEL:
         return None
     side = (columns[best] > bound) == above
     here, there = int(np.sum(bad & side)), int(np.sum(bad & ~side))
