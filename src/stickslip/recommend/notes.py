@@ -118,7 +118,7 @@ def weak_on(plants: Sequence[RigidAxis], drive: Drive) -> str:
 
 def notes_on(found: Identified, result: Recommendation, weak: str = "") -> Iterator[str]:
     """What the user must know of the model and of what is recommended; `weak` as of `weak_on`."""
-    chosen, candidates, drive = result.chosen, result.candidates, result.drive
+    chosen, candidates = result.chosen, result.candidates
     if weak:
         limit = "the torque limit of the drive lies below their friction"
         yield f"On {weak} axes {limit}, though not below that of the best estimate: they do not follow."
@@ -138,7 +138,12 @@ def notes_on(found: Identified, result: Recommendation, weak: str = "") -> Itera
             f"A constant torque of {offset} acts in addition to friction: it is part of what is recommended, "
             "simulated and exported."
         )
-    yield _simulated(drive.machine, found.train, drive.delay)
+
+
+def interval_allows(found: Identified, result: Recommendation) -> Iterator[str]:
+    """What was simulated, and how the interval allows for the rest, where something is recommended."""
+    if result.chosen is not None or result.instead is not None:
+        yield _simulated(result.drive.machine, found.train, result.drive.delay)
 
 
 def _stiff_feedback(candidates: Sequence[Candidate]) -> Iterator[str]:

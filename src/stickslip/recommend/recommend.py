@@ -38,6 +38,7 @@ from stickslip.recommend.notes import (
     axes_left_out,
     better_than_simulated,
     beyond_inertia,
+    interval_allows,
     lag_of,
     notes_on,
     sampled_as,
@@ -153,8 +154,9 @@ def recommend(
     notes = [
         *sampled_as(drive, chosen, found.motion == "linear"), *on_motion(drive, found.unit("rad")),
         *axes_left_out(bench, others, found), *seconds_meant(drive), *hardly_damped_where_late(found, drive, j),
-        *lag_of(bench.plants[0], first, linear, drive), *(() if rung else unsure_at_rest(found, linear)),
-        *_reasons(found, result, bench, others), *notes_on(found, result, weak),
+        *lag_of(bench.plants[0], first, linear, drive), *notes_on(found, result, weak),
+        *(() if rung else unsure_at_rest(found, linear)), *_reasons(found, result, bench, others),
+        *interval_allows(found, result),
     ]  # fmt: skip
     return replace(result, notes=tuple(notes))
 

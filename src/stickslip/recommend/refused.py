@@ -30,6 +30,8 @@ NOT_FRICTION = (
     "that matters (--motion)"
 )
 
+NARROWER = "identify a record that narrows the intervals of the model (measure_next in its file)"
+
 
 def closest(candidates: Sequence[Candidate]) -> Candidate | None:
     """Return the candidate that comes closest to a recommendation; None if none was tried.
@@ -69,9 +71,9 @@ def why_refused(found: Identified, candidates: Sequence[Candidate], bench: Bench
     said = f"the closest candidate ({name}) is refused on {sum(bad)} of {len(bad)} axes: {what}{left}"
     if (split := separate(found, plants[1:], bad[1:])) is not None:
         return f"{said}; {split.words}: {split.remedy}"
-    remedy = remedy_of(decided) if decided else NOT_FRICTION
     if all(bad):
-        return f"{said}; {remedy}"
+        return f"{said}; {remedy_of(decided)}"
+    remedy = remedy_of(decided) if decided else NARROWER
     return f"{said}; no single sampled attribute separates these axes from the others: {remedy}"
 
 
