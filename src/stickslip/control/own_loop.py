@@ -58,7 +58,7 @@ def split_loop(
     for word in words:
         if word not in REFERENCE_VELOCITIES:
             raise UnknownName(f"{REFERENCE_VELOCITY} of --loop", word, REFERENCE_VELOCITIES)
-        return numbers, cast("ReferenceVelocity", word)
+        return numbers, word
     return numbers, None
 
 
