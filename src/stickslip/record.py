@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -183,6 +184,26 @@ def encoder_step(position: Array) -> float:
     step = float(np.mean(changes[changes < 1.5 * step]))
     multiples = changes[changes < 50.0 * step] / step
     return step if float(np.mean(np.abs(multiples - np.round(multiples)) < 0.02)) > 0.95 else 0.0
+
+
+SAME_COUNTS = 2e-3
+"""Share of a count by which the step in a log, a difference of rounded positions, may be off the encoder's."""
+
+
+def counts_of_step(step: float, linear: bool = False) -> int:
+    """Return the encoder counts per revolution (of a linear axis per 2 pi m) of a position step, rad (m).
+
+    A count of an encoder is a power of 2 or some thousands per revolution, or a length of two digits, if the step is
+    that close to one.
+    """
+    counts = 2.0 * math.pi / step
+    if linear:
+        near = float(f"{step:.2g}")
+        return round(2.0 * math.pi / (near if abs(step - near) < SAME_COUNTS * near else step))
+    for near in (2 ** round(math.log2(counts)) if counts >= 1.0 else 0, 1000 * round(counts / 1000.0)):
+        if near and abs(counts - near) < SAME_COUNTS * near:
+            return int(near)
+    return round(counts)
 
 
 def row_period(record: Record) -> float:

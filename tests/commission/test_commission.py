@@ -33,6 +33,7 @@ from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
 from stickslip.recommend.axes import plants_of
 from stickslip.recommend.notes import notes_on
+from stickslip.recommend.recommendation import Recommendation
 from stickslip.report.identified import Source, write_identification
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.narrower_limits import limited
@@ -189,7 +190,8 @@ def the_model_is_known_to_sweeps_recommendations_and_comparisons(folder):
     found = read_identified(folder / "model.toml")
     plants = list(plants_of(found, 1.3e-3, 4, 1))
     assert len({p.friction.parameters for p in plants}) == 5
-    assert not any("no intervals" in note for note in notes_on(found, None, []))
+    none = Recommendation(None, None, {}, 0.0, math.nan, math.inf, (), 1)
+    assert not any("no intervals" in note for note in notes_on(found, none))
     content = tomllib.loads((folder / "model.toml").read_text())
     for e in (e for e in content["estimates"] if e["name"] in ("fs", "fc")):
         # Fc reaches down to 0 (no slow level tells it from the fall): a change must exceed that.

@@ -7,20 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_inertia_alone import identified
 from test_recommend_reasons import drive_of
 
 from stickslip.identify.motion import HOLD, Motion
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
-from stickslip.recommend.axes import plants_of
-from stickslip.recommend.candidate_run import LEFT, Drive, Trial, run
+from stickslip.recommend.candidate_run import Drive, Trial, run
 from stickslip.recommend.candidates import Bench, Candidate, Setting
 from stickslip.recommend.course import course_of
-from stickslip.recommend.motion_notes import by_reference_velocity, on_motion
+from stickslip.recommend.motion_notes import on_motion
 from stickslip.recommend.plant import Plant
 from stickslip.recommend.recommendation import Recommendation
-from stickslip.recommend.refusals import doubted_inertia
 from stickslip.report.recommendation_text import reduction
 from stickslip.verbs.motion_given import motion_in
 
@@ -194,36 +191,6 @@ def test_a_measured_motion_is_told_from_the_drives_reference(tmp_path: Path) -> 
         for motion in (did, asked)
     )
     assert promised == f"{plain}, along the motion as measured"
-
-
-def test_the_best_estimate_forms_its_reference_velocity_as_the_measured_one() -> None:
-    """With that of the instant a drive was told 54 %, and 88 % on half of the sampled axes: it got 82 %."""
-    best, *_ = plants_of(identified(0.1, 0.02), 4e-4, 0, 0)
-    assert best.backward
-    plants = [replace(best, backward=kind) for kind in (True, True, False, True, False)]
-    chosen = Candidate(Setting("coulomb", "feedforward", 0.8), (0.1, 0.1, 0.4, 0.12, 0.5), ())
-    (said,) = by_reference_velocity(chosen, plants)
-    assert "11 % of the error on half of the sampled axes where it is the difference of two setpoints" in said
-    assert "45 % where it is the velocity of the instant; the difference of two setpoints is better" in said
-    alike = replace(chosen, errors=(0.1, 0.1, 0.12, 0.12, 0.1))
-    spread = replace(chosen, errors=(0.1, 0.05, 0.12, 0.3, 0.5))
-    assert not list(by_reference_velocity(alike, plants))
-    assert not list(by_reference_velocity(spread, plants))
-    assert not list(by_reference_velocity(None, plants))
-
-
-def test_an_unknown_inertia_is_named_as_the_reason_for_no_recommendation() -> None:
-    found = identified(0.1, 0.02)
-    lost = Candidate(Setting("coulomb", "feedforward", 0.8), (0.1,), (f"{LEFT} on an axis sampled later",))
-    calm = replace(lost, unsafe=("rough motion",))
-    assert not list(doubted_inertia(found, [lost]))
-    (told,) = [e for e in found.estimates if e.name == "inertia"]
-    unsure = replace(found, estimates=tuple(replace(e, identified=e is not told) for e in found.estimates))
-    assert not list(doubted_inertia(unsure, [calm]))
-    (said,) = doubted_inertia(unsure, [calm, lost])
-    assert said.startswith("The model's inertia")
-    assert "is not identified" in said
-    assert "--inertia" in said
 
 
 def test_what_fails_alone_is_not_called_the_compensators() -> None:

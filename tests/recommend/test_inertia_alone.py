@@ -17,8 +17,7 @@ from stickslip.identify.identified_file import Identified
 from stickslip.model import Model
 from stickslip.recommend import recommend as recommending
 from stickslip.recommend.candidate_run import Drive
-from stickslip.recommend.candidates import HARDLY, Candidate, Setting
-from stickslip.recommend.notes import notes_on
+from stickslip.recommend.candidates import Candidate, Setting
 from stickslip.recommend.recommend import adds, recommend
 from stickslip.verbs.recommendation import RecommendationResult
 
@@ -121,27 +120,3 @@ def test_beside_control_laws_the_inertia_feedforward_alone_holds_no_friction_law
     loop = Controller(loop=ControlBlock("pd", kp=6.0, kd=0.1), sample_time=1e-3)
     made = FED.on(loop, Model("coulomb", fc=0.1, sigma2=1e-4))
     assert [b.law.name for b in made.blocks.values()][1:] == ["inertia_feedforward", "pd"]
-
-
-@pytest.mark.usefixtures("few")
-def test_where_nothing_is_recommended_the_safe_ones_are_told_why_not() -> None:
-    """A list of what is unsafe was the whole reason, where the safe feedforwards had been hardly worth it."""
-    drive = Drive(20.0, amplitude=0.5, frequency=2.0, torque_limit=3.0, encoder_counts=4096.0)
-    advice = recommend(identified(0.004, 0.005), drive, axes=1, confirm=2, feed_inertia=False)
-    assert advice.chosen is None
-    safe = [c for c in advice.candidates if not c.unsafe]
-    assert safe
-    assert all(HARDLY in c.useless for c in safe)
-    (said,) = [note for note in advice.notes if note.startswith("No compensator is recommended")]
-    assert f"what is safe gives {HARDLY}, at best {100.0 * min(c.worst for c in safe):.1f} % left" in said
-
-
-def test_the_reasons_of_the_safe_and_of_the_others_are_kept_apart() -> None:
-    back = Candidate(Setting("coulomb", "feedback", 0.8), (0.985,), ("limit cycle at rest",))
-    hardly = Candidate(FRICTION, (0.969, 0.97), (), HARDLY)
-    found = identified(0.1, 0.1)
-    (said,) = [note for note in notes_on(found, None, [hardly, back]) if note.startswith("No compensator")]
-    assert said == (
-        f"No compensator is recommended: what is safe gives {HARDLY}, at best 97.0 % left on the worst axis simulated; "
-        "the rest is not safe: limit cycle at rest."
-    )

@@ -28,7 +28,7 @@ from stickslip.recommend.beside import belief_of, tried_beside
 from stickslip.recommend.file import write_setting
 from stickslip.recommend.recommend import Drive, recommend
 from stickslip.recommend.swings import between_counts
-from stickslip.report.recommendation_text import beside_lines
+from stickslip.report.recommendation_text import beside_lines, instead_lines, recommendation_lines
 from stickslip.simulation.closed_loop import simulate
 from stickslip.study.bench_decision import CHATTER
 from stickslip.study.bench_metrics import judged
@@ -81,9 +81,12 @@ def test_what_is_not_switched_on_is_told_why(tmp_path):
     taken = advice.instead
     lines = beside_lines(advice)
     if taken is None:
-        assert lines[-1] == "none of these is better than what is said above"
+        assert all("<- yes" not in line for line in lines)
     else:
-        assert any(x.startswith(f"switch on instead: {taken.label}; it leaves at most") for x in lines)
+        printed = recommendation_lines(advice, found.unit)
+        (said,) = [line for line in printed if line.startswith("switch on:")]
+        assert said.startswith(f"switch on:         {taken.label}; it leaves at most")
+        assert sum("<- " in line for line in printed) == 1
         file = write_setting(tmp_path / "recommended.toml", found, advice)
         assert read_controller(file).values() == pytest.approx(taken.controller.values())
 
@@ -189,8 +192,8 @@ def test_what_is_switched_on_tells_what_it_learned_with_its_uncertainty():
         "feedforward_angle": {"meaning": "map", "unit": "N·m", "value": [0.1, 0.2], "uncertainty": None},
     }
     taken = beside.Beside("scale-dob", "PD", (0.1,), "", None, learned)
-    lines = beside_lines(SimpleNamespace(beside=(taken,), instead=taken, hunts=""))
-    assert lines[-3].startswith("switch on instead: PD + scale-dob; it leaves at most 10.0 %")
+    lines = instead_lines(SimpleNamespace(hunts="", chosen=None), taken)
+    assert lines[-3].startswith("switch on:         PD + scale-dob; it leaves at most 10.0 %")
     assert "up to 14.0 % with what is not simulated" in lines[-3]
     assert lines[-2] == "learned there:     scale (feedforward_scale) = 1.02 ± 0.03"
     assert lines[-1].endswith("= 2 values from 0.1 to 0.2 N·m; no uncertainty given")

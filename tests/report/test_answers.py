@@ -18,12 +18,13 @@ from stickslip.identify.axis.identify import identify_axis
 from stickslip.identify.axis.result import on_untold
 from stickslip.identify.estimate import Estimate, Held, Identification
 from stickslip.identify.experiment import Experiment
+from stickslip.identify.needed_motions import EXPERIMENTS, MOTIONS
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 from stickslip.report.answers import answers_of, either_way, evidence, meaning_of, one_number_each
 from stickslip.report.axis_pictures import pictures_of
 from stickslip.report.identified import Source, rendered, symbol, tally
-from stickslip.report.next_steps import EXPERIMENTS, MOTIONS, counts_of, forward, lacking
+from stickslip.report.next_steps import counts_of, forward, lacking
 from stickslip.report.result_text import result_lines, result_lines_in_python
 from stickslip.report.sliding_torque import over_all_rows, sliding_of
 from stickslip.report.torque_pictures import friction_points, with_gaps

@@ -79,11 +79,16 @@ def drive_arguments(parser: argparse.ArgumentParser) -> None:
         help="how late a command acts, in samples (default: up to one, drawn; a --machine has its own)",
     )  # fmt: skip
     parser.add_argument(
+        "--reference-velocity", choices=("difference", "instant"),
+        help="how the drive forms its reference velocity: difference of two reference positions, or that of the "
+        "trajectory at the sample (default: both are simulated)",
+    )  # fmt: skip
+    parser.add_argument(
         "--counts-per-rev",
         type=float,
         metavar="N",
         help="encoder counts per revolution, of a linear axis per 2π m (2π over the scale's step in m); 0: no "
-        "quantisation (default the machine's, or 0)",
+        "quantisation (default the machine's, else by the position step of the identified record, else 0)",
     )
     parser.add_argument(
         "--linear",
@@ -95,7 +100,7 @@ def drive_arguments(parser: argparse.ArgumentParser) -> None:
         "--loop", metavar="kp=..,kd=..",
         help="gains of the existing loop: kp (N·m/rad), ki, kd, kr of a PID; or kv (1/s), kvp (N·m·s/rad), kvi "
         "(N·m/rad), feed (share of the velocity feedforward, default 1) of a position P loop around a velocity PI "
-        "loop; optionally filter (Hz, first-order low-pass on the velocity) and limit (N·m)",
+        "loop; optionally filter (Hz, first-order low-pass on the velocity), limit (N·m) and reference_velocity",
     )  # fmt: skip
     parser.add_argument(
         "--controller", type=Path, metavar="FILE.toml",
@@ -166,8 +171,9 @@ def run(args: argparse.Namespace) -> int:
         result = recommend(
             args.model, bandwidth=args.bandwidth, damping=args.damping, linear=args.linear, loop=args.loop,
             controller=args.controller, machine=args.machine, sample_time=args.sample_time, delay=args.delay,
-            counts_per_rev=args.counts_per_rev, torque_limit=args.torque_limit,
-            motion=args.motion, motion_map=args.motion_map, remember=True, amplitude=args.amplitude,
+            reference_velocity=args.reference_velocity, counts_per_rev=args.counts_per_rev,
+            torque_limit=args.torque_limit, motion=args.motion, motion_map=args.motion_map, remember=True,
+            amplitude=args.amplitude,
             frequency=args.frequency, inertia=args.inertia, feed_inertia=args.feed_inertia,
             compensators=[n.strip() for n in args.compensators.split(",")] if args.compensators else (),
             axes=args.axes, confirm=args.confirm, progress=progress,

@@ -12,6 +12,7 @@ from stickslip.arguments import arguments_checked
 from stickslip.control.block import ControlBlock, fields_in, state_fields_in, within
 from stickslip.control.calls import calls_of, deviations_of
 from stickslip.control.composition import MEMORY, Settings, functions_with
+from stickslip.control.own_loop import ReferenceVelocity
 from stickslip.control.plain import plain_sample
 from stickslip.errors import ParameterError, suggestion
 from stickslip.spec import Field, Kept, Learned, Surroundings, fields_of, packed
@@ -29,6 +30,7 @@ class Composed:
 
     torque_limit: float
     sample_time: float
+    reference_velocity: ReferenceVelocity | None
 
     @functools.cached_property
     def blocks(self) -> dict[str, ControlBlock]:
@@ -109,8 +111,9 @@ class Composed:
     def settings(self) -> Settings:
         """The numbers of the composition."""
         return Settings(
-            self.torque_limit, self.sample_time, 1.0 - math.exp(-SLOW * self.sample_time), FADE, 0.0
-        )
+            self.torque_limit, self.sample_time, 1.0 - math.exp(-SLOW * self.sample_time), FADE, 0.0,
+            float(self.reference_velocity == "difference"),
+        )  # fmt: skip
 
     @property
     def parameters(self) -> SimpleNamespace:

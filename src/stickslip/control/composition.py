@@ -37,6 +37,14 @@ class Settings(NamedTuple):
         float, Par("s", "", "over which a torque that was taken over, or held in a fault, fades; 0: at once")
     ]
     clock: Annotated[float, Par("-", "", "1 where samples make the time, 0 where the caller gives it")]
+    difference: Annotated[
+        float,
+        Par(
+            "-",
+            "",
+            "1: reference velocity formed as the difference of reference positions; 0: as it is given",
+        ),
+    ]
 
 
 class Memory(NamedTuple):
@@ -144,19 +152,25 @@ def see(
     reference_acceleration: float, n: Any, m: Any,
 ) -> None:  # fmt: skip
     """Write down what is measured and asked for."""
+    before = m.error
     m.moved = 0.0
     m.elapsed = n.sample_time
+    m.error = TURN * (reference_turns - turns) + (reference - position)
     if m.started != 0.0:
         m.moved = TURN * (turns - m.turns) + (position - m.position)
         m.elapsed = n.sample_time + m.waited
+    else:
+        before = m.error
     m.turns = turns
     m.position = position
     m.reference = reference
     m.reference_velocity = reference_velocity
+    if n.difference != 0.0:
+        # Of the errors, which stay small: the turns split off two references may differ.
+        m.reference_velocity = (m.error - before + m.moved) / m.elapsed
     m.reference_acceleration = reference_acceleration
-    m.error = TURN * (reference_turns - turns) + (reference - position)
     m.torque_limit = n.torque_limit
-    if abs(reference_velocity) < STILL:
+    if abs(m.reference_velocity) < STILL:
         m.rest += 1.0
     else:
         m.rest = 0.0

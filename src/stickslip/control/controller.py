@@ -15,6 +15,7 @@ from stickslip.control.compensator import Compensator
 from stickslip.control.composed import Composed
 from stickslip.control.continuous import Continuous, continuous_form, refuse_windup
 from stickslip.control.linear import Cascade, Gains
+from stickslip.control.own_loop import ReferenceVelocity
 from stickslip.control.short_form import laws_meant, refuse_short
 from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.errors import ModelRemark, ParameterError
@@ -25,6 +26,7 @@ Blocks = ControlBlock | Sequence[ControlBlock] | None
 STANDARD = {
     "gains": None, "compensator": None, "torque_limit": math.inf, "sample_time": 0.0, "encoder_counts": 0.0,
     "velocity_filter": 0.0, "loop": (), "feedforward": (), "observer": (), "estimator": None, "alone": False,
+    "reference_velocity": None,
 }  # fmt: skip
 """What a controller's fields are where nobody gives them"""
 SLOW_SAMPLE = 0.1
@@ -66,6 +68,10 @@ class Controller(Composed):
         How the velocity is found from measured positions; the backward difference, if none is given.
     alone : bool
         Whether a law that adapts may stand without an integral or an observer, as in a comparison; no file says so.
+    reference_velocity : {"difference", "instant"}, optional
+        "difference": the controller forms its reference velocity from the last two reference positions, as many drives
+        do; only with a sample time. "instant": it takes the velocity that comes with the reference. Not stated it does
+        the latter, and `recommend` tries both.
 
     Raises
     ------
@@ -89,6 +95,7 @@ class Controller(Composed):
     observer: tuple[ControlBlock, ...]
     estimator: ControlBlock | None
     alone: bool
+    reference_velocity: ReferenceVelocity | None
 
     def __init__(
         self,
@@ -104,11 +111,13 @@ class Controller(Composed):
         observer: Blocks = None,
         estimator: ControlBlock | None = None,
         alone: bool = False,
+        reference_velocity: ReferenceVelocity | None = None,
     ) -> None:
         own = {"loop": _listed(loop), "feedforward": _listed(feedforward), "observer": _listed(observer)}
         vars(self).update(
             gains=gains, compensator=compensator, torque_limit=torque_limit, sample_time=sample_time,
-            encoder_counts=encoder_counts, velocity_filter=velocity_filter, estimator=estimator, alone=alone, **own,
+            encoder_counts=encoder_counts, velocity_filter=velocity_filter, estimator=estimator, alone=alone,
+            reference_velocity=reference_velocity, **own,
         )  # fmt: skip
         self._refuse_numbers()
         refuse_short(gains, compensator, velocity_filter, sample_time)
@@ -134,6 +143,11 @@ class Controller(Composed):
         if self.encoder_counts > 0.0 and self.sample_time == 0.0:
             raise ParameterError(
                 "controller: encoder_counts needs a sampled controller; give a sample_time greater than 0"
+            )
+        if self.reference_velocity == "difference" and self.sample_time == 0.0:
+            raise ParameterError(
+                "controller: reference_velocity = 'difference' needs a sampled controller; give a sample_time greater "
+                "than 0"
             )
 
     @property
@@ -297,6 +311,7 @@ class Controller(Composed):
         """Plain data that says everything about it."""
         own = self.described() if self.is_short else {p: block.as_dict() for p, block in self.blocks.items()}
         names = ("sample_time", "torque_limit", "encoder_counts", *(["velocity_filter"] * self.is_short))
+        own |= {"reference_velocity": self.reference_velocity or "instant"}
         return {**own, **{name: getattr(self, name) for name in names}}
 
     def described(self) -> dict[str, Any]:
@@ -304,7 +319,8 @@ class Controller(Composed):
         if not self.is_short:
             return {"controller": self.as_dict()}
         helper = self.compensator
-        return {"gains": self.numbers(), **({"compensator": helper.as_dict()} if helper else {})}
+        stated = {"reference_velocity": self.reference_velocity or "instant"} if self.sample_time else {}
+        return {"gains": self.numbers(), **({"compensator": helper.as_dict()} if helper else {}), **stated}
 
 
 def _listed(blocks: Blocks) -> tuple[ControlBlock, ...]:

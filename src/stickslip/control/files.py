@@ -33,6 +33,7 @@ from typing import Any, cast
 from stickslip.config import Table, read_toml
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
+from stickslip.control.own_loop import REFERENCE_VELOCITIES, REFERENCE_VELOCITY, ReferenceVelocity
 from stickslip.control.registry import control_law, control_law_names, law_files
 from stickslip.control.short_tables import OF_GAINS, Placement, compensator_in, gains_in, placement
 from stickslip.control_spec import PLACES, ControlLaw
@@ -147,11 +148,19 @@ def composed(
             table.number("encoder_counts", "counts per revolution", 0.0, lower=0.0),
             table.number("velocity_filter", "Hz", 0.0, lower=0.0),
             estimator=estimator[0] if estimator else None,
+            reference_velocity=reference_velocity_in(table),
             **places,
         )
     if made.remark:
         warnings.warn(f"{table.label()}: {made.remark}", ModelRemark, stacklevel=2)
     return made
+
+
+def reference_velocity_in(table: Table) -> ReferenceVelocity | None:
+    """How a controller's table forms the reference velocity; None where it does not say so."""
+    if not table.has(REFERENCE_VELOCITY):
+        return None
+    return cast("ReferenceVelocity", table.choice(REFERENCE_VELOCITY, REFERENCE_VELOCITIES))
 
 
 def listed(table: Table, place: str) -> Iterator[Table]:

@@ -1,18 +1,65 @@
 """The loop that a drive has, by the names of its gains: those of a PID, or of position P around velocity PI.
 
-`stickslip identify --loop` and `stickslip recommend --loop` describe it so.
+`stickslip identify --loop` and `stickslip recommend --loop` describe it so. How the drive forms its reference velocity
+is a word of the same description, ``reference_velocity=difference``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Literal, cast
 
+from stickslip.config import named_numbers
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import InputError, UnknownName
+
+ReferenceVelocity = Literal["difference", "instant"]
+"""How a drive forms its reference velocity: from the last two reference positions, or the trajectory's own velocity at
+the sample."""
+REFERENCE_VELOCITIES: tuple[ReferenceVelocity, ...] = ("difference", "instant")
+REFERENCE_VELOCITY = "reference_velocity"
+"""Its name in a description of a loop."""
 
 USUAL_TIME = 1e-3
 """s, sample time of a drive's loop where nothing tells it."""
 CASCADE_ONLY = tuple(name for name in Cascade._fields if name not in Gains._fields)
+
+
+def loop_text(given: str | Mapping[str, float | str]) -> str:
+    """Return a loop's description as the command line has it."""
+    if isinstance(given, str):
+        return given
+    words = {name: x if isinstance(x, str) else repr(float(x)) for name, x in given.items()}
+    return ",".join(f"{name}={word}" for name, word in words.items())
+
+
+def split_loop(
+    given: str | Mapping[str, float | str],
+) -> tuple[dict[str, float], ReferenceVelocity | None]:
+    """Return the numbers of a loop's description, and how its drive forms the reference velocity, if it is stated.
+
+    Raises
+    ------
+    InputError
+        If an entry is not NAME=VALUE, or the reference velocity is neither kind.
+    """
+    if isinstance(given, str):
+        entries = [entry.partition("=") for entry in given.split(",")]
+        words = {value.strip() for name, _, value in entries if name.strip() == REFERENCE_VELOCITY}
+        pairs = ["".join(entry) for entry in entries if entry[0].strip() != REFERENCE_VELOCITY]
+        numbers = named_numbers(pairs)
+    else:
+        words = {str(given[REFERENCE_VELOCITY])} if REFERENCE_VELOCITY in given else set[str]()
+        numbers = {name: cast("float", x) for name, x in given.items() if name != REFERENCE_VELOCITY}
+        if texts := [f"{name} = {x!r}" for name, x in numbers.items() if isinstance(x, (str, bool))]:
+            raise InputError(f"--loop: {texts[0]} must be a number in SI units")
+    if len(words) > 1:
+        raise InputError(f"--loop: {REFERENCE_VELOCITY} is given {len(words)} times; give it once")
+    for word in words:
+        if word not in REFERENCE_VELOCITIES:
+            raise UnknownName(f"{REFERENCE_VELOCITY} of --loop", word, REFERENCE_VELOCITIES)
+        return numbers, word
+    return numbers, None
 
 
 def kind_of_loop(numbers: Mapping[str, float], beside: Sequence[str]) -> type[Gains] | type[Cascade]:

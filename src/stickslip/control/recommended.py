@@ -15,7 +15,9 @@ from typing import Any
 from stickslip.config import Table, read_toml
 from stickslip.control.compensator import COMPENSATORS, Compensator
 from stickslip.control.controller import Controller
+from stickslip.control.files import reference_velocity_in
 from stickslip.control.linear import Cascade, Gains, place
+from stickslip.control.own_loop import ReferenceVelocity
 from stickslip.errors import InputError
 from stickslip.model import Model
 from stickslip.spec import fields_of
@@ -58,6 +60,8 @@ class Recommended:
         N·m, of the drive that it was tried with; infinite where it had none.
     encoder_counts : float
         Counts per revolution of the encoder that it was tried with; 0 measured exactly.
+    reference_velocity : {"difference", "instant"} or None
+        How the drive forms its reference velocity, where that was stated.
     """
 
     compensator: str
@@ -76,6 +80,7 @@ class Recommended:
     velocity_filter: float = 0.0
     torque_limit: float = math.inf
     encoder_counts: float = 0.0
+    reference_velocity: ReferenceVelocity | None = None
 
     @property
     def linear(self) -> Gains | Cascade:
@@ -106,7 +111,7 @@ class Recommended:
         """The loop that it was tried in, with the compensator on its law."""
         return Controller(
             self.linear, self.on(model), self.torque_limit, self.sample_time, self.encoder_counts,
-            self.velocity_filter,
+            self.velocity_filter, reference_velocity=self.reference_velocity,
         )  # fmt: skip
 
 
@@ -139,7 +144,7 @@ def recommended_in(whole: Table) -> Recommended:
             given.number("offset", "N·m", 0.0), given.number("inertia_feedforward", "kg·m²", 0.0, 0.0),
             own, given.number("velocity_filter", "Hz", 0.0, 0.0),
             given.positive("torque_limit", "N·m", math.inf),
-            given.number("encoder_counts", "counts per revolution", 0.0, 0.0),
+            given.number("encoder_counts", "counts per revolution", 0.0, 0.0), reference_velocity_in(given),
         )  # fmt: skip
 
 

@@ -77,7 +77,10 @@ def compensator_table(compensator: Compensator, name_of: NameOf) -> dict[str, An
 
 def _limits(controller: Controller) -> dict[str, Any]:
     own = {"torque_limit": controller.torque_limit, "encoder_counts": controller.encoder_counts}
-    return {name: value for name, value in own.items() if value and math.isfinite(value)}
+    limits: dict[str, Any] = {name: value for name, value in own.items() if value and math.isfinite(value)}
+    if controller.reference_velocity:
+        limits["reference_velocity"] = controller.reference_velocity
+    return limits
 
 
 def _placed(blocks: Sequence[tuple[ControlBlock, NameOf]]) -> dict[str, Any]:

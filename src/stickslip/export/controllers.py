@@ -117,6 +117,8 @@ def given_by(controller: Controller) -> str:
     if compensates_alone(controller):
         parts += [] if any(own["offset"] for own in fed) else ["no constant torque"]
         parts += [] if any(own["inertia"] for own in fed) else ["nothing for the inertia"]
+    if controller.reference_velocity == "difference":
+        parts.append("with the reference velocity formed as the difference of two reference positions")
     limit = controller.torque_limit
     return ", ".join([*parts, *([f"within ±{limit:.6g} N·m"] if math.isfinite(limit) else [])])
 

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -39,7 +39,8 @@ class Identified:
     motion : str
         "rotary" or "linear".
     data : tuple of mapping
-        ``file``, ``sha256``, ``rows``, ``sample_time`` (s, between its rows) of every record.
+        ``file``, ``sha256``, ``rows``, ``sample_time`` (s, between its rows), ``position_step`` (rad or m, of its
+        encoder or its digits) of every record.
     misfit : mapping of str to float
     trajectory : Motion or None
         The motion of the record that it was identified on.
@@ -73,12 +74,20 @@ class Identified:
     @property
     def sampled(self) -> tuple[float, str]:
         """Shortest time between rows of its records, s, and the file of that record; 0 and "" where it is not told."""
-        told = [
-            (float(period), str(d.get("file", "")))
+        return min(self._of_records("sample_time"), default=(0.0, ""))
+
+    @property
+    def position_step(self) -> tuple[float, str]:
+        """Coarsest step of the positions in its records, rad (m), and that record's file; 0 and "" if none shows."""
+        return max(self._of_records("position_step"), default=(0.0, ""))
+
+    def _of_records(self, name: str) -> list[tuple[float, str]]:
+        """A positive number of every record that has it, each with the record's file."""
+        return [
+            (float(value), str(d.get("file", "")))
             for d in self.data
-            if isinstance(period := d.get("sample_time"), (int, float)) and 0.0 < period < math.inf
+            if isinstance(value := d.get(name), (int, float)) and 0.0 < value < math.inf
         ]
-        return min(told, default=(0.0, ""))
 
     @property
     def law_estimates(self) -> tuple[tuple[Estimate, ...], Array]:
@@ -110,26 +119,52 @@ def identified_in(table: Table) -> Identified:
                 str(e["name"]), str(e["unit"]), str(e["name"]), float(e["value"]), float(e["std"]), float(e["lower"]),
                 float(e["upper"]), bool(e["identified"]), str(e.get("verdict", "")),
             )
-            for e in content.get("estimates", [])
+            for e in _tables(content, "estimates", file)
         )  # fmt: skip
-        matrix = np.array(content.get("correlation", {}).get("matrix", []), dtype=np.float64)
+        matrix = np.array(_table(content, "correlation", file).get("matrix", []), dtype=np.float64)
         matrix = matrix.reshape(len(estimates), len(estimates))
     except KeyError as error:
         raise InputError(f"{file}: one of its estimates lacks {error}; identify the axis again") from None
     except (TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{file}: its estimates cannot be read ({error}); identify the axis again") from None
-    axis = dict(content.get("axis", {}))
-    if isinstance(axis.get("inertia", 0.0), (str, bool, list, dict)):
-        raise InputError(f"{file}: axis.inertia = {axis['inertia']!r} must be a number in kg·m² (kg)")
+    axis = dict(_table(content, "axis", file))
+    for name, value in axis.items():
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if name != "seen_from" and not (number and math.isfinite(value)):
+            raise InputError(
+                f"{file}: axis.{name} = {value!r} must be a number in SI units, and finite; correct it"
+            )
+    try:
+        speeds = {
+            k: np.abs(np.array(v, dtype=np.float64)) for k, v in _table(content, "speeds", file).items()
+        }
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{file}: its speeds cannot be read ({error}); identify the axis again") from None
     return Identified(
         file, model, estimates, np.where(np.isfinite(matrix), matrix, np.eye(len(estimates))),
-        axis, str(content.get("motion", "rotary")), tuple(content.get("data", [])),
-        {k: float(v) for k, v in dict(content.get("misfit", {})).items() if isinstance(v, (int, float))},
+        axis, str(content.get("motion", "rotary")), tuple(_tables(content, "data", file)),
+        {k: float(v) for k, v in _table(content, "misfit", file).items() if isinstance(v, (int, float))},
         motion_in(content, str(file)),
-        {k: np.abs(np.array(v, dtype=np.float64)) for k, v in dict(content.get("speeds", {})).items()},
+        speeds,
         str(table.document.folder / law) if (law := str(content["law"])).endswith(".py") else "",
         train_in(content, str(file)),
     )  # fmt: skip
+
+
+def _table(content: Mapping[str, Any], name: str, file: Path) -> dict[str, Any]:
+    """A table of a model's file; empty if it has none."""
+    value: Any = content.get(name, {})
+    if not isinstance(value, dict):
+        raise InputError(f"{file}: {name} = {value!r} must be a table [{name}]; identify the axis again")
+    return cast("dict[str, Any]", value)
+
+
+def _tables(content: Mapping[str, Any], name: str, file: Path) -> list[dict[str, Any]]:
+    """A list of tables of a model's file; empty if it has none."""
+    value: Any = content.get(name, [])
+    if not isinstance(value, list) or not all(isinstance(e, dict) for e in cast("list[Any]", value)):
+        raise InputError(f"{file}: {name} = {value!r} must be tables [[{name}]]; identify the axis again")
+    return cast("list[dict[str, Any]]", value)
 
 
 def covariance(estimates: tuple[Estimate, ...], correlation: Array, logarithmic: list[bool]) -> Array:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.binding import NEGATIVE
+from stickslip.control.own_loop import ReferenceVelocity
 from stickslip.errors import ParameterError
 from stickslip.friction_levels import static_level
 from stickslip.identify.axis.falling import missing_fall
@@ -71,6 +72,7 @@ def plants_of(
     given: bool = False,
     machine: Machine | None = None,
     delay: float | None = None,
+    reference_velocity: ReferenceVelocity | None = None,
 ) -> Iterator[Plant]:
     """The best estimate, and `count` axes drawn; about another inertia as wide in proportion.
 
@@ -90,6 +92,8 @@ def plants_of(
         angle at which the motion begins, and the noise.
     delay : float, optional
         By which the drive's commands act late, samples; drawn, up to one, where neither this nor a machine says it.
+    reference_velocity : {"difference", "instant"}, optional
+        How the drive forms its reference velocity; drawn, and the difference on the best estimate, unless given.
     """
     known = {name: float(found.axis.get(name, 0.0) or 0.0) for name in ("offset", "gravity", "gravity_angle")}
     yield Plant(
@@ -97,7 +101,7 @@ def plants_of(
         found.model,
         offset=known["offset"],
         waves=_hanging(known["gravity"], known["gravity_angle"], start),
-        backward=True,
+        backward=reference_velocity != "instant",
         flexible=found.train.axis(inertia) if found.train else None,
         machine=machine,
         delay=delay or 0.0,
@@ -115,14 +119,17 @@ def plants_of(
         here = {name: named.get(name, value) for name, value in known.items()}
         part = named.get("inertia", identified) / identified
         own = inertia * min(max(part, 1.0 / (1.0 + known_to)), 1.0 + known_to)
+        friction = _with_springs(_falling(model, found, unseen), own, found.motion, rng, most)
+        rms = 0.0 if told_of(machine) else misfit * float(rng.uniform())
+        waves = _unmodelled(rms, found.motion, rng) if not told_of(machine) else ()
+        train = _swinging(found.train, own, swings)
+        drive = _late(rng, delay) if machine is None else _turned(machine, rng)
+        if reference_velocity is not None:
+            drive["backward"] = reference_velocity == "difference"
         yield Plant(
-            own, _with_springs(_falling(model, found, unseen), own, found.motion, rng, most), offset=here["offset"],
-            waves=(
-                *_hanging(here["gravity"], here["gravity_angle"], start),
-                *(() if told_of(machine) else _unmodelled(misfit * float(rng.uniform()), found.motion, rng)),
-            ),
-            flexible=_swinging(found.train, own, swings),
-            **(_late(rng, delay) if machine is None else _turned(machine, rng)),
+            own, friction, offset=here["offset"],
+            waves=(*_hanging(here["gravity"], here["gravity_angle"], start), *waves),
+            flexible=train, sampled={k: v for k, v in named.items() if k != "inertia"}, unmodelled=rms, **drive,
         )  # fmt: skip
 
 

@@ -185,7 +185,10 @@ def judged(
         made = compensated(name, loop or LOOPS[0], belief)
     except ParameterError as error:
         return Beside(name, loop, (), str(error).removeprefix("belief: "), None)
-    made = replace(fed(made, inertia, offset), encoder_counts=bench.drive.encoder_counts)
+    made = replace(
+        fed(made, inertia, offset), encoder_counts=bench.drive.encoder_counts,
+        reference_velocity=bench.drive.reference_velocity,
+    )  # fmt: skip
     if why := refused(name, made, belief, bench.drive):
         return Beside(name, loop, (), why, made)
     return on_axes(Beside(name, loop, (), "", made), bench, " ")

@@ -15,6 +15,7 @@ from stickslip.arguments import insist_on_own
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
 from stickslip.control.linear import Cascade, Gains, place
+from stickslip.control.own_loop import ReferenceVelocity
 from stickslip.errors import ParameterError
 from stickslip.identify.motion import HOLD, Motion, sinusoid
 from stickslip.machines.machine import LONGEST_DELAY, Machine
@@ -27,6 +28,9 @@ from stickslip.recommend.swings import above, repeats, reversals, turns
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 AT_REST = "limit cycle at rest"
+IN_MOTION = "oscillates in motion"
+ROUGH_MOTION = "rough motion"
+LARGER = "a larger error than without it"
 LEFT = "position or velocity left every reasonable bound"
 
 BUSY = 1.0
@@ -67,6 +71,8 @@ class Drive:
         For people: where that is from; empty where nobody needs to be told.
     encoder_counts : float
         Per revolution (2 pi); 0 measures exactly.
+    encoder_from : str
+        For people: where that is from; empty where nobody needs to be told.
     torque_limit : float
         N·m
     amplitude : float or None
@@ -88,6 +94,9 @@ class Drive:
         The machine at hand, with its resonances, encoder, amplifier and delay; None: rigid axes.
     delay : float or None
         By which its commands act late, samples, where no machine says it; None: drawn, up to one sample.
+    reference_velocity : {"difference", "instant"} or None
+        How it forms its reference velocity; None: not known. The best estimate then has the difference, and the drawn
+        axes have either.
     """
 
     bandwidth: float = 10.0
@@ -105,6 +114,8 @@ class Drive:
     machine: Machine | None = None
     sample_time_from: str = ""
     delay: float | None = None
+    encoder_from: str = ""
+    reference_velocity: ReferenceVelocity | None = None
 
     def __post_init__(self) -> None:
         insist_on_own(self, "drive")
@@ -115,8 +126,10 @@ class Drive:
                 said = "" if endless else " and finite"
                 raise ParameterError(f"drive: {name} = {value:g} must be greater than 0{said}")
         for name in ("encoder_counts", "velocity_filter"):
-            if not getattr(self, name) >= 0.0:
-                raise ParameterError(f"drive: {name} = {getattr(self, name):g} must be 0 or greater")
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ParameterError(
+                    f"drive: {name} = {getattr(self, name):g} must be 0 or greater, and finite"
+                )
         if self.amplitude is not None and self.amplitude < SMALLEST:
             raise ParameterError(
                 f"drive: amplitude = {self.amplitude:g} must be at least {SMALLEST:g} rad (m)"
@@ -174,11 +187,15 @@ class Drive:
         """The linear controller, or the one made of control laws, alone."""
         if self.controller is not None:
             limit = min(self.torque_limit, self.controller.torque_limit)
-            return replace(self.controller, torque_limit=limit, encoder_counts=self.encoder_counts)
+            return replace(
+                self.controller, torque_limit=limit, encoder_counts=self.encoder_counts,
+                reference_velocity=self.reference_velocity,
+            )  # fmt: skip
         gains = self.gains or place(self.linear, inertia, self.bandwidth, self.damping)
         return Controller(
-            gains, None, self.torque_limit, self.sample_time, self.encoder_counts, self.velocity_filter
-        )
+            gains, None, self.torque_limit, self.sample_time, self.encoder_counts, self.velocity_filter,
+            reference_velocity=self.reference_velocity,
+        )  # fmt: skip
 
     @cached_property
     def path(self) -> Motion:
@@ -375,10 +392,10 @@ def dangers(before: Trial, after: Trial, drive: Drive, feedforward: bool = False
     if resting > rested + BUSY and repeats(after.late, swing) and not feedforward:
         yield AT_REST
     if now > max(was, 0.0) + BUSY + BOUNCES * drive.stops:
-        yield "oscillates in motion"
+        yield IN_MOTION
     rough = "velocity_above_50Hz_rms_rad_s"
     bearable = (KICKS if feedforward else ROUGH) * after.moving["speed_rms_rad_s"]
     if after.moving[rough] > max(LIVELIER * before.moving[rough], bearable):
-        yield "rough motion"
+        yield ROUGH_MOTION
     if after.moving["position_rms_rad"] > before.moving["position_rms_rad"]:
-        yield "a larger error than without it"
+        yield LARGER

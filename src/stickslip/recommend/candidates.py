@@ -78,6 +78,13 @@ class Setting:
         return self.gain > 0.0
 
     @property
+    def words(self) -> str:
+        """What is switched on, in words."""
+        if not self.compensates:
+            return "inertia feedforward alone, without friction compensation"
+        return f"{self.kind} of law {self.law!r}, gain {self.gain:g}"
+
+    @property
     def label(self) -> str:
         """The law that compensates friction, or what is fed forward without one."""
         return self.law if self.compensates else "inertia alone"
@@ -122,12 +129,15 @@ class Candidate:
         Why it is not safe to switch on; empty where it is.
     useless : str
         Why it is not worth it where it is safe; empty where it is.
+    refused_as : Setting or None
+        The setting with which it was refused at the confirmation, with its lead and the gain tried; None: it was not.
     """
 
     setting: Setting
     errors: tuple[float, ...]
     unsafe: tuple[str, ...]
     useless: str = ""
+    refused_as: Setting | None = None
 
     @property
     def refused(self) -> tuple[str, ...]:
@@ -179,8 +189,8 @@ class Account:
 class Bench:
     """Axes, each with what the linear controller alone does on it, and the laws that may be switched on.
 
-    `ran` is called after every axis that was simulated. `left_out` counts axes that were drawn and not held; `rested`
-    is what the linear controller alone swings by at rest for long, once it is known.
+    `ran` is called after every axis that was simulated. `left_out` are axes that were drawn and not held; `rested` is
+    what the linear controller alone swings by at rest for long, once it is known.
     """
 
     def __init__(
@@ -189,7 +199,7 @@ class Bench:
     ) -> None:  # fmt: skip
         self.plants, self.linear, self.drive, self.laws, self.ran = plants, linear, drive, laws, ran
         self.alone: list[Trial | str] = []
-        self.left_out = 0
+        self.left_out: list[RigidAxis] = []
         self.rested: list[float] | None = None
         self._judged: dict[Setting, Candidate] = {}
         self._pushed: dict[int, float] = {}
@@ -205,7 +215,7 @@ class Bench:
         for plant, trial in in_turn(lambda plant: (plant, run(plant, linear, drive)), drawn) if count else ():
             ran()
             if lost(trial, best, drive):
-                bench.left_out += 1
+                bench.left_out.append(plant)
                 continue
             kept.append(plant)
             alone.append(trial)
@@ -249,18 +259,24 @@ class Bench:
         return self._judged[setting]
 
     def _judge(self, setting: Setting) -> Candidate:
-        controller = setting.on(self.linear, self.laws[setting.law])
         errors: list[float] = []
-        for before, after in self.trials(controller):
-            if isinstance(after, str) or isinstance(before, str):
-                return Candidate(setting, (*errors, math.inf), (why_lost(before, after),))
-            errors.append(after.moving["position_rms_rad"] / before.moving["position_rms_rad"])
-            unsafe = tuple(dangers(before, after, self.drive, setting.kind == "feedforward"))
-            if not unsafe and setting.kind == "feedback" and self.swings_on(len(errors) - 1, controller):
-                unsafe = (AFTER_A_PUSH,)
+        for error, unsafe in self.every(setting):
+            errors.append(error)
             if unsafe:
                 return Candidate(setting, tuple(errors), unsafe)
         return Candidate(setting, tuple(errors), (), HARDLY if max(errors) > WORTH else "")
+
+    def every(self, setting: Setting) -> Iterator[tuple[float, tuple[str, ...]]]:
+        """The part of the error that is left, and why it is not safe, on one axis after the other."""
+        controller = setting.on(self.linear, self.laws[setting.law])
+        for i, (before, after) in enumerate(self.trials(controller)):
+            if isinstance(after, str) or isinstance(before, str):
+                yield math.inf, (why_lost(before, after),)
+                continue
+            unsafe = tuple(dangers(before, after, self.drive, setting.kind == "feedforward"))
+            if not unsafe and setting.kind == "feedback" and self.swings_on(i, controller):
+                unsafe = (AFTER_A_PUSH,)
+            yield after.moving["position_rms_rad"] / before.moving["position_rms_rad"], unsafe
 
     def swings_on(self, i: int, controller: Controller) -> bool:
         """Whether after a push at rest axis i swings on under this controller, and not under the linear one."""

@@ -97,4 +97,5 @@ def recommended_table(advice: Recommendation, machine: str = "") -> dict[str, An
         inertia_feedforward=setting.inertia_feedforward,
         gains=loop.gains if own else None, velocity_filter=loop.velocity_filter,
         torque_limit=loop.torque_limit, encoder_counts=loop.encoder_counts,
+        reference_velocity=loop.reference_velocity,
     ).table()  # fmt: skip

@@ -1,21 +1,18 @@
-"""What the user must know of the motion: whose it is, where it jumps, and how the drive forms its velocity."""
+"""What the user must know of the motion: whose it is, where it jumps, and what the error along it depends on."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from statistics import median
 
-import numpy as np
-
+from stickslip.identify.identified_file import Identified
 from stickslip.machines.rigid import RigidAxis
 from stickslip.recommend.candidate_run import Drive
 from stickslip.recommend.candidates import Candidate
 from stickslip.recommend.course import measured
-from stickslip.recommend.plant import Plant
+from stickslip.recommend.separation import dependence
 
 APART = 1.5
-"""Times the error left on half of the axes of one kind, from which on it matters which kind the drive is, where three
-quarters of the one kind leave more than three quarters of the other."""
+"""Ratio of both medians of the error left, from which on it matters on which side of a threshold the axis is."""
 
 
 def on_motion(drive: Drive, angle: str) -> Iterator[str]:
@@ -32,30 +29,29 @@ def on_motion(drive: Drive, angle: str) -> Iterator[str]:
         often = f"{len(course.jumps)} times" if len(course.jumps) > 1 else "once"
         yield (
             f"The reference steps {often}, by up to {course.highest_jump:.3g} {angle}, which no axis "
-            "follows at once. Its velocity and acceleration are taken as 0 at a step, as in a drive that feeds nothing "
-            "forward there; one that differentiates a step gets a kick, which is not simulated."
+            f"follows at once. {_at_jumps(drive)}"
         )
 
 
-def by_reference_velocity(chosen: Candidate | None, plants: Sequence[RigidAxis]) -> Iterator[str]:
-    """Whether it matters how the drive forms its reference velocity, by the axes on which it was confirmed."""
-    if chosen is None:
-        return
-    drawn = list(zip(plants, chosen.errors, strict=False))[1:]
-    backward, instant = (
-        [error for plant, error in drawn if isinstance(plant, Plant) and plant.backward is kind]
-        for kind in (True, False)
+def _at_jumps(drive: Drive) -> str:
+    """What the reference velocity is where the position jumps."""
+    if drive.reference_velocity == "difference":
+        return "The drive differentiates it: the jump of the reference velocity is simulated."
+    return (
+        "Its velocity and acceleration are taken as 0 at a step, as in a drive that feeds nothing forward there; one "
+        "that differentiates a step gets a kick, which is not simulated."
     )
-    if not backward or not instant:
+
+
+def by_attribute(found: Identified, chosen: Candidate | None, plants: Sequence[RigidAxis]) -> Iterator[str]:
+    """On which sampled attribute the error left depends most, by the axes on which the setting was confirmed."""
+    if chosen is None or len(chosen.errors) < len(plants):
         return
-    mean, there = median(backward), median(instant)
-    less, more = sorted((backward, instant), key=median)
-    if median(more) <= APART * median(less) or np.quantile(more, 0.25) <= np.quantile(less, 0.75):
-        return
-    which = "difference of two setpoints" if mean < there else "velocity of the instant"
-    yield (
-        f"What is left depends on the drive's reference velocity: {100.0 * mean:.2g} % of the error on half of the "
-        f"sampled axes where it is the difference of two setpoints over the sample time, as the measured velocity is, "
-        f"{100.0 * there:.2g} % where it is the velocity of the instant; the {which} is better. The best estimate has "
-        "the difference."
-    )
+    most = dependence(found, plants[1:], chosen.errors[1 : len(plants)], APART)
+    if most is not None:
+        split, worse, better = most
+        yield (
+            f"The error left depends most on {split.attribute.name}: {100.0 * worse:.2g} % on half of the sampled "
+            f"axes {split.side(split.above)}, {100.0 * better:.2g} % on half of those {split.side(not split.above)}. "
+            f"To know it: {split.remedy}."
+        )

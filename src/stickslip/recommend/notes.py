@@ -14,23 +14,26 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.machines.two_inertias import TwoInertias
 from stickslip.recommend.candidate_run import Drive, Trial, run
 from stickslip.recommend.candidates import Bench, Candidate, resistance
+from stickslip.recommend.recommendation import ALLOWANCE, BETTER, Recommendation
+from stickslip.recommend.resolution import resolution_words
 from stickslip.recommend.sample_time import ROWS
+from stickslip.recommend.separation import separate
 
 MOSTLY, PARTLY = 0.5, 0.15
 """Of the error: what a lag makes beyond that is most of it; and from where on it is worth a word."""
-ALLOWANCE, BETTER = 1.4, 2.0
-"""Factors on the error left, upwards and downwards, for resonances, backlash, cogging and the like, which a machine has
-or has not: so the promise held in `benchmarks/promise.py`."""
 BETTER_AT_MOTOR = 5.0
 """The second where friction is simulated at the load, and may act at the motor: so it held in `benchmarks/belts.py`."""
 UNSURE = f"no certain reduction (more than {100.0 / ALLOWANCE:.0f} % left)"
 """Why a safe setting is not worth it."""
 
 
-def sampled_as(drive: Drive, chosen: Candidate | None) -> Iterator[str]:
-    """The sample time that all of this holds for, and where it is from."""
+def sampled_as(drive: Drive, chosen: Candidate | None, linear: bool = False) -> Iterator[str]:
+    """The sample time, the encoder and the reference velocity that all of this holds for, and where they are from."""
     if drive.sample_time_from:
         yield f"Simulated with a sample time of {drive.sample_time:g} s, {drive.sample_time_from}."
+    if drive.encoder_from:
+        yield f"Simulated with {resolution_words(drive.encoder_counts, linear)}, {drive.encoder_from}."
+        yield _reference_velocity(drive)
     if chosen is None and drive.sample_time_from.startswith(ROWS) and drive.sample_time > USUAL_TIME:
         yield (
             "A loop that is sampled more often than its record was kept may bear a compensator where this one does "
@@ -38,16 +41,30 @@ def sampled_as(drive: Drive, chosen: Candidate | None) -> Iterator[str]:
         )
 
 
+def _reference_velocity(drive: Drive) -> str:
+    """How the drive forms its reference velocity in the simulations."""
+    if drive.reference_velocity == "difference":
+        return (
+            "Simulated with a reference velocity that is the difference of two reference positions, as given."
+        )
+    if drive.reference_velocity == "instant":
+        return "Simulated with a reference velocity of the instant, as given."
+    return (
+        "Simulated with a reference velocity that is the difference of two reference positions on the best estimate, "
+        "and of either kind on the sampled axes, as it is not stated; give --reference-velocity difference or instant "
+        "(Python: reference_velocity=)."
+    )
+
+
 def axes_left_out(bench: Bench, others: Bench, found: Identified) -> Iterator[str]:
     """Of the axes that the intervals allow, those that the user's own loop would not hold."""
-    count = bench.left_out + others.left_out
-    if count:
-        held = len(bench.plants) + len(others.plants) - 2
-        unsure = [e.name for e in found.estimates if not e.identified]
-        why = f" (not identified: {', '.join(unsure)})" if unsure else ""
+    lost, held = [*bench.left_out, *others.left_out], [*bench.plants[1:], *others.plants[1:]]
+    if lost:
+        split = separate(found, [*lost, *held], [*(True for _ in lost), *(False for _ in held)])
+        which = f" ({split.words})" if split else ""
         yield (
-            f"{count} of {count + held} axes sampled from the intervals{why} were left out: this loop alone does not "
-            "hold them, and is taken to hold the machine."
+            f"{len(lost)} of {len(lost) + len(held)} axes sampled from the intervals were left out: this loop alone "
+            f"does not hold them{which}, and is taken to hold the machine."
         )
 
 
@@ -99,15 +116,9 @@ def weak_on(plants: Sequence[RigidAxis], drive: Drive) -> str:
     return f"{count} of {len(plants)}" if count else ""
 
 
-def notes_on(
-    found: Identified,
-    chosen: Candidate | None,
-    candidates: Sequence[Candidate],
-    weak: str = "",
-    machine: Machine | None = None,
-    delay: float | None = None,
-) -> Iterator[str]:
-    """What the user must know."""
+def notes_on(found: Identified, result: Recommendation, weak: str = "") -> Iterator[str]:
+    """What the user must know of the model and of what is recommended; `weak` as of `weak_on`."""
+    chosen, candidates = result.chosen, result.candidates
     if weak:
         limit = "the torque limit of the drive lies below their friction"
         yield f"On {weak} axes {limit}, though not below that of the best estimate: they do not follow."
@@ -116,21 +127,36 @@ def notes_on(
             "The pendulum's weight is not part of the setting: the error that it makes is in the numbers above. Less "
             "is left once gravity sin(q - gravity_angle) of the model is added to the drive's torque."
         )
-    unknown = [e.name for e in found.estimates if not e.identified]
-    yield from _intervals(found, unknown)
-    if chosen is None:
-        yield from _none(candidates, unknown)
+    yield from _intervals(found, [e.name for e in found.estimates if not e.identified])
+    if chosen is None and result.instead is None:
         return
-    stiffer = [c for c in candidates if c.setting.kind == "feedback" and c.setting.gain == 1.0 and c.unsafe]
-    if stiffer and chosen.setting.compensates:
-        yield f"Feedback at gain 1 is not safe: {', '.join(stiffer[0].unsafe)}."
+    if result.instead is None and chosen is not None and chosen.setting.compensates:
+        yield from _stiff_feedback(candidates)
     if abs(float(found.axis.get("offset", 0.0))) > 0.0:
         offset = f"{float(found.axis['offset']):.4g} {found.unit('N·m')}"
         yield (
             f"A constant torque of {offset} acts in addition to friction: it is part of what is recommended, "
             "simulated and exported."
         )
-    yield _simulated(machine, found.train, delay)
+
+
+def interval_allows(found: Identified, result: Recommendation) -> Iterator[str]:
+    """What was simulated, and how the interval allows for the rest, where something is recommended."""
+    if result.chosen is not None or result.instead is not None:
+        yield _simulated(result.drive.machine, found.train, result.drive.delay)
+
+
+def _stiff_feedback(candidates: Sequence[Candidate]) -> Iterator[str]:
+    """With which laws and deadbands feedback of all of the friction is not safe."""
+    whole = [c for c in candidates if c.setting.kind == "feedback" and c.setting.gain == 1.0]
+    several = len({c.setting.deadband for c in whole}) > 1
+    by_reason: dict[str, list[str]] = {}
+    for c in (c for c in whole if c.unsafe):
+        which = f" with {'a' if c.setting.deadband else 'no'} deadband" if several else ""
+        by_reason.setdefault(", ".join(c.unsafe), []).append(f"law {c.setting.law!r}{which}")
+    if by_reason:
+        said = "; ".join(f"{', '.join(laws)} ({why})" for why, laws in by_reason.items())
+        yield f"Feedback at gain 1 is not safe for {said}."
 
 
 def _intervals(found: Identified, unknown: Sequence[str]) -> Iterator[str]:
@@ -147,63 +173,28 @@ def _intervals(found: Identified, unknown: Sequence[str]) -> Iterator[str]:
         )
 
 
-def beyond_inertia(
-    chosen: Candidate | None, friction: Candidate | None, candidates: Sequence[Candidate]
-) -> Iterator[str]:
-    """Why friction is not compensated beside the inertia feedforward, where that alone is switched on."""
+def beyond_inertia(chosen: Candidate | None, friction: Candidate | None, why: str) -> Iterator[str]:
+    """Why friction is not compensated in addition to the inertia feedforward, where that alone is switched on.
+
+    `why` is the reason where no friction compensation may be switched on.
+    """
     if chosen is None or chosen.setting.compensates:
         return
-    why = why_none([c for c in candidates if c.setting.compensates])
     if friction is not None:
         best, alone = friction.setting, chosen
         why = (
-            f"on the sampled axes it adds hardly anything; the best ({best.kind} of law {best.law!r}, gain "
-            f"{best.gain:g}) leaves {_left(friction)}, the inertia feedforward alone {_left(alone)}"
+            f"on the sampled axes it adds hardly anything; the best ({best.words}) leaves {_left(friction)}, the "
+            f"inertia feedforward alone {_left(alone)}"
         )
     yield f"No friction compensation beyond the inertia feedforward is recommended: {why}."
     yield "A drive that feeds its acceleration forward already has it: there is nothing more to switch on."
 
 
 def _left(candidate: Candidate) -> str:
-    """What it leaves of the error."""
+    """The part of the error left, in words."""
     worst = f"{100.0 * candidate.worst:.1f} % of the error on the worst axis"
     usual = f" and at most {100.0 * candidate.usual:.1f} % on half of them"
     return worst + (usual if len(candidate.errors) > 2 else "")
-
-
-def why_none(candidates: Sequence[Candidate]) -> str:
-    """Why none of them is recommended: what the safe ones lack, and what is not safe about the others."""
-    safe = [c for c in candidates if not c.unsafe]
-    useless = sorted({c.useless for c in safe if c.useless})
-    unsafe = ", ".join(sorted({said for c in candidates for said in c.unsafe}))
-    if not safe:
-        return unsafe or "none was tried"
-    best = 100.0 * min(c.worst for c in safe)
-    said = (
-        f"what is safe gives {', '.join(useless) or 'no less error'}, at best {best:.1f} % left on the worst axis "
-        "simulated"
-    )
-    return f"{said}; the rest is not safe: {unsafe}" if unsafe else said
-
-
-def _none(candidates: Sequence[Candidate], unknown: Sequence[str]) -> Iterator[str]:
-    """Why no compensator is recommended."""
-    yield f"No compensator is recommended: {why_none(candidates)}."
-    unsure = [c.worst for c in candidates if c.useless.startswith(UNSURE)]
-    if unsure:
-        yield (
-            f"The best safe setting leaves {100.0 * min(unsure):.1f} % of the error on the worst axis simulated; "
-            f"{ALLOWANCE:g} times that is allowed for, for what is not simulated, so that no reduction is certain "
-            f"above {100.0 / ALLOWANCE:.0f} % left."
-        )
-    # Of those that go beyond the best estimate, which is simulated first, and would do if it were all.
-    left = [c.errors[0] for c in candidates if len(c.errors) > 1 and ALLOWANCE * c.errors[0] <= 1.0]
-    if unknown and left:
-        yield (
-            f"On the best estimate {100.0 * min(left):.0f} % of the error would be left; other axes that the "
-            f"record allows decide, since it does not determine {', '.join(unknown)}: what to record for them is "
-            "listed in the model file (measure_next)."
-        )
 
 
 def better_than_simulated(machine: Machine | None, train: TwoInertias | None) -> float:

@@ -9,7 +9,8 @@ direction included.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -47,6 +48,10 @@ class Plant(RigidAxis):
         Motor and load behind a spring; None: a rigid axis.
     machine : Machine or None
         The machine at hand, in place of ``delay``, ``bandwidth`` and ``flexible``.
+    sampled : mapping of str to float
+        Drawn values of the estimates, by name.
+    unmodelled : float
+        Drawn torque over the position, N·m RMS.
     """
 
     offset: float = 0.0
@@ -56,6 +61,8 @@ class Plant(RigidAxis):
     backward: bool = False
     flexible: FlexibleAxis | TwoMassAxis | None = None
     machine: Machine | None = None
+    sampled: Mapping[str, float] = field(default_factory=dict[str, float])
+    unmodelled: float = 0.0
 
     @cached_property
     def kept(self) -> dict[tuple[float, float], Laid]:

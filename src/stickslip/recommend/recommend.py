@@ -31,13 +31,14 @@ from stickslip.recommend.candidates import (
 )
 from stickslip.recommend.late import hardly_damped_where_late, refuse_late, seconds_meant
 from stickslip.recommend.long_rest import hunts_alone, hunts_with, long_rests, unsure_at_rest
-from stickslip.recommend.motion_notes import by_reference_velocity, on_motion
+from stickslip.recommend.motion_notes import by_attribute, on_motion
 from stickslip.recommend.notes import (
     ALLOWANCE,
     UNSURE,
     axes_left_out,
     better_than_simulated,
     beyond_inertia,
+    interval_allows,
     lag_of,
     notes_on,
     sampled_as,
@@ -47,13 +48,13 @@ from stickslip.recommend.plant import Plant
 from stickslip.recommend.question import cautious, inertia_of, laws_of, with_motion
 from stickslip.recommend.recommendation import Recommendation
 from stickslip.recommend.refusals import (
-    doubted_inertia,
     held,
     refuse_endless,
     refuse_loaded,
     refuse_unknown,
     refuse_weak,
 )
+from stickslip.recommend.refused import why_refused
 
 GAINS = (0.5, 0.7, 0.8, 0.9, 1.0)
 BEYOND = (1.1, 1.25, 1.5)
@@ -141,23 +142,38 @@ def recommend(
         beside = tried_beside(compensators, belief, bench, others, fed, offset)
         hunts = limit_cycle(chosen.setting.on(linear, laws[chosen.setting.law]), bench, 0) if chosen else ""
     account.end()
-    notes = [
-        *sampled_as(drive, chosen), *on_motion(drive, found.unit("rad")), *axes_left_out(bench, others, found),
-        *seconds_meant(drive), *hardly_damped_where_late(found, drive, j),
-        *lag_of(bench.plants[0], first, linear, drive), *by_reference_velocity(chosen, others.plants),
-        *notes_on(
-            found, chosen, choice.candidates, weak_on([*bench.plants, *others.plants[1:]], drive), drive.machine,
-            drive.delay,
-        ),
-        *beyond_inertia(chosen, choice.friction, choice.candidates), *(() if rung else unsure_at_rest(found, linear)),
-        *(doubted_inertia(found, choice.candidates) if chosen is None and inertia is None else ()),
-    ]  # fmt: skip
-    return Recommendation(
+    result = Recommendation(
         chosen, laws[chosen.setting.law] if chosen else None, linear.numbers(),
         first.moving["position_rms_rad"], choice.margin, choice.unsafe_gain, choice.candidates, len(bench.plants),
-        tuple(notes), drive, rung, j, beside, hunts, better_than_simulated(drive.machine, found.train),
-        choice.inertia_alone, choice.friction,
+        (), drive, rung, j, beside, hunts, better_than_simulated(drive.machine, found.train), choice.inertia_alone,
+        choice.friction,
     )  # fmt: skip
+    if chosen is None and result.instead is None:
+        result = replace(result, why_none=why_refused(found, result.candidates, bench, others))
+    weak = weak_on([*bench.plants, *others.plants[1:]], drive)
+    notes = [
+        *sampled_as(drive, chosen, found.motion == "linear"), *on_motion(drive, found.unit("rad")),
+        *axes_left_out(bench, others, found), *seconds_meant(drive), *hardly_damped_where_late(found, drive, j),
+        *lag_of(bench.plants[0], first, linear, drive), *notes_on(found, result, weak),
+        *(() if rung else unsure_at_rest(found, linear)), *_reasons(found, result, bench, others),
+        *interval_allows(found, result),
+    ]  # fmt: skip
+    return replace(result, notes=tuple(notes))
+
+
+def _reasons(found: Identified, result: Recommendation, bench: Bench, others: Bench) -> Iterator[str]:
+    """What the error left by the recommended setting depends on; or the one reason why nothing is recommended, or why
+    no friction is compensated."""
+    chosen = result.switched_on
+    if result.why_none:
+        yield f"No compensator is recommended: {result.why_none}."
+    if chosen is None:
+        return
+    yield from by_attribute(found, chosen, others.plants)
+    if not chosen.setting.compensates:
+        friction = [c for c in result.candidates if c.setting.compensates]
+        why = "" if result.friction else why_refused(found, friction, bench, others)
+        yield from beyond_inertia(chosen, result.friction, why)
 
 
 def recommend_on(
@@ -223,7 +239,7 @@ def drawn(found: Identified, inertia: float | None, count: int, seed: int, empty
     own = drive.given  # Only of a loop that somebody runs is it known that it holds the axis.
     plants = plants_of(
         found, inertia_of(found, inertia), (TRIES if own else 1) * count, seed, float(drive.course.whole.position[0]),
-        inertia is not None, drive.machine, drive.delay,
+        inertia is not None, drive.machine, drive.delay, drive.reference_velocity,
     )  # fmt: skip
     return (
         Bench.held(plants, count, linear, drive, laws, ran) if own else Bench(list(plants), linear, drive, laws, ran)
@@ -339,7 +355,10 @@ def confirmed(
         if final.unsafe:
             unsafe.append(final.setting)
         rejected[best.setting] = replace(
-            best, unsafe=tuple(w + where for w in final.unsafe), useless=final.useless
+            best,
+            unsafe=tuple(w + where for w in final.unsafe),
+            useless=final.useless,
+            refused_as=final.setting,
         )
     return None, rejected, unsafe
 

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from statistics import median
 from typing import Any
 
 from stickslip.model import Model
 from stickslip.recommend.beside import Beside
 from stickslip.recommend.candidate_run import Drive
 from stickslip.recommend.candidates import NEAR, Candidate
-from stickslip.recommend.notes import ALLOWANCE, BETTER
+
+ALLOWANCE, BETTER = 1.4, 2.0
+"""Factors on the error left, upwards and downwards, for resonances, backlash, cogging and the like, which a machine has
+or has not: so the promise held in `benchmarks/promise.py`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +24,8 @@ class Recommendation:
     Attributes
     ----------
     chosen : Candidate or None
-        None: switch no compensator on. Its errors are those on the axes that it was not picked on.
+        The best setting of a law; None: none is safe and worth it. Its errors are those on the axes that it was not
+        picked on. Another compensator may be better (`instead`): `switched_on` is the setting where it is not.
     model : Model or None
         The law to run, with its parameters.
     gains : mapping
@@ -51,6 +56,8 @@ class Recommendation:
     friction : Candidate or None
         The best setting that compensates friction, on the same axes; it is not the chosen one where it adds nothing to
         the inertia feedforward alone. None where there is none.
+    why_none : str
+        The one reason why no compensator is recommended, and what to do; empty where one is.
     """
 
     chosen: Candidate | None
@@ -70,6 +77,7 @@ class Recommendation:
     better: float = BETTER
     inertia_alone: Candidate | None = None
     friction: Candidate | None = None
+    why_none: str = ""
 
     @property
     def instead(self) -> Beside | None:
@@ -80,6 +88,18 @@ class Recommendation:
         return best if self.chosen is None or self.hunts or NEAR * best.at_most < self.chosen.worst else None
 
     @property
+    def switched_on(self) -> Candidate | None:
+        """The setting to switch on; None if none is, or a compensator of the catalogue is (`instead`)."""
+        return self.chosen if self.instead is None else None
+
+    @property
+    def _errors(self) -> tuple[float, ...]:
+        """Errors left by what is recommended: the best estimate, and the axes that it was not picked on."""
+        if self.instead is not None:
+            return self.instead.confirmed or self.instead.errors
+        return self.chosen.errors if self.chosen else ()
+
+    @property
     def reduction(self) -> tuple[float, float]:
         """Least and greatest part of the error that is taken away, over the axes that the setting was not picked on
         and the best estimate.
@@ -88,20 +108,20 @@ class Recommendation:
         little more: the best estimate may widen them. They are moved apart by `ALLOWANCE` and `better`,
         for what machines have and the simulation has not.
         """
-        if self.chosen is None:
+        if not self._errors:
             return 0.0, 0.0
-        return 1.0 - ALLOWANCE * max(self.chosen.errors), 1.0 - min(self.chosen.errors) / self.better
+        return 1.0 - ALLOWANCE * max(self._errors), 1.0 - min(self._errors) / self.better
 
     @property
     def usual_reduction(self) -> float:
         """The part of the error that is taken away at least on half of the axes that the setting was not picked on; NaN
         where it was confirmed on none."""
-        return 1.0 - self.chosen.usual if self.chosen and self.confirmed_on else math.nan
+        return 1.0 - median(self._errors[1:]) if self.confirmed_on > 0 else math.nan
 
     @property
     def confirmed_on(self) -> int:
-        """How many drawn axes the chosen setting was confirmed on."""
-        return len(self.chosen.errors) - 1 if self.chosen else 0
+        """How many drawn axes what is recommended was confirmed on."""
+        return max(len(self._errors) - 1, 0)
 
     @property
     def confidence(self) -> float:
@@ -112,15 +132,15 @@ class Recommendation:
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            "chosen": self.chosen.as_dict() if self.chosen else None,
-            "model": self.model.as_dict() if self.model else None, "gains": self.gains,
+            "chosen": self.switched_on.as_dict() if self.switched_on else None,
+            "model": self.model.as_dict() if self.model and self.switched_on else None, "gains": self.gains,
             "linear_error_rms": self.linear_error, "margin": self.margin, "unsafe_gain": self.unsafe_gain,
-            "reduction": list(self.reduction) if self.chosen else None, "reduction_confidence": self.confidence,
+            "reduction": list(self.reduction) if self._errors else None, "reduction_confidence": self.confidence,
             "usual_reduction": self.usual_reduction if self.confirmed_on else None,
             "inertia_alone": self.inertia_alone.as_dict() if self.inertia_alone else None,
             "axes": self.axes, "axes_confirmed": self.confirmed_on, "notes": list(self.notes),
             "linear_alone_rings": self.rings, "drive": self.drive.as_dict(),
             "candidates": [c.as_dict() for c in self.candidates],
             "compensators": [b.as_dict() for b in self.beside],
-            "instead": self.instead.label if self.instead else None,
+            "instead": self.instead.label if self.instead else None, "why_none": self.why_none,
         }  # fmt: skip

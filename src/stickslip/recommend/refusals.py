@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
 
 import numpy as np
 
@@ -10,8 +10,8 @@ from stickslip.analyse.wording import ends
 from stickslip.errors import InputError
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.identified_file import Identified
-from stickslip.recommend.candidate_run import LEFT, Drive, Trial
-from stickslip.recommend.candidates import Candidate, breakaway, resistance
+from stickslip.recommend.candidate_run import Drive, Trial
+from stickslip.recommend.candidates import breakaway, resistance
 
 MOST_STEPS = 1e10
 """Of all simulations together; more would take half a day."""
@@ -60,6 +60,12 @@ def refuse_unknown(found: Identified) -> None:
     ------
     InputError
     """
+    for e in found.estimates:
+        if any(math.isnan(x) for x in (e.value, e.lower, e.upper)):
+            raise InputError(
+                f"{found.path}: the estimate of {e.name} is {e.value:g} [{e.lower:g}, {e.upper:g}], from which no axis "
+                "can be sampled; identify the axis again"
+            )
     levels = [e for e in found.law_estimates[0] if e.unit in ("N·m", "N")]
     if levels and not any(e.identified or 0.0 < e.upper <= WITHIN * e.lower for e in levels):
         listed = ", ".join(
@@ -103,10 +109,8 @@ def held(found: Identified, alone: Trial | str, drive: Drive, inertia: float | N
         if error <= LOST * size:
             return alone
         alone = f"RMS error {error:.3g} {found.unit('rad')} along a motion of {size:.3g}"
-    unsure = [e.name for e in found.estimates if not e.identified]
-    doubt = f", which does not determine {', '.join(unsure)}," if unsure else ""
     raise InputError(
-        f"on the axis of {found.path}{doubt} the linear loop alone is unstable: {alone}; "
+        f"on the axis of {found.path} the linear loop alone is unstable: {alone}; "
         + (unsure_inertia(found) if inertia is None else "")
         + "check its gains, or identify a record with faster motion"
     )
@@ -119,19 +123,6 @@ def unsure_inertia(found: Identified) -> str:
         return ""
     own = f"give that with --inertia in {unit} (Python: inertia=)"
     return f"{said}, and the loop may be stable on the axis's own: {own}, "
-
-
-def doubted_inertia(found: Identified, candidates: Sequence[Candidate]) -> Iterator[str]:
-    """That no loop suits every inertia that the record allows, and the remedy; nothing where the record tells it, or
-    the sampled axes were held."""
-    lost = any(LEFT in said for c in candidates for said in c.unsafe)
-    if lost and (said := inertia_said(found)):
-        own = f"Give the axis's own with --inertia in {found.unit('kg·m²')} (Python: inertia=)"
-        yield (
-            f"{said[0].upper()}{said[1:]}: loop and feedforward are made for that number, and tried on axes with all "
-            "that the interval allows, up to a factor of 9. Most likely this is why axes are not held there. "
-            f"{own}, or identify a record with stronger accelerations."
-        )
 
 
 def inertia_said(found: Identified) -> str:

@@ -9,34 +9,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stickslip.control.linear import Cascade, Gains
-from stickslip.control.own_loop import USUAL_TIME
+from stickslip.control.own_loop import REFERENCE_VELOCITY, USUAL_TIME
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
+from stickslip.identify.needed_motions import MOTIONS, experiment_for
 from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
-from stickslip.record import Record, encoder_step, row_period
+from stickslip.record import SAME_COUNTS, Record, counts_of_step, encoder_step, row_period
 from stickslip.report.after_a_map import after_a_map
 from stickslip.report.sliding_torque import beaten, sliding_of
 
-OWN_LOOP = (*Gains._fields, *Cascade._fields, "filter", "limit")
+OWN_LOOP = (*Gains._fields, *Cascade._fields, "filter", "limit", REFERENCE_VELOCITY)
 """Numbers of an identification's --loop that a recommendation's has too."""
 OPTIONS = "  # with the options of this run"
-EXPERIMENTS = {
-    "inertia": "inertia", "fs": "breakaway", "sigma0": "presliding", "k": "presliding", "alpha": "presliding",
-    "fc": "sliding", "vs": "sliding", "sigma2": "sliding", "delta_s": "sliding",
-    "sigma1": "stickslip", "c": "stickslip",
-}  # fmt: skip
-"""The procedure that a rig runs for a number."""
-MOTIONS = {
-    "inertia": "accelerations to and fro", "sliding": "constant speeds in both directions, three of them at least",
-    "breakaway": "slow ramps of the torque from rest, until it moves",
-    "presliding": "slow ramps of the torque to and fro, below break-away", "stickslip": "slow constant speeds",
-}  # fmt: skip
-"""What it moves, for a drive that does it in a program of its own."""
 HEAVY = 0.25
 """Of friction's level: a torque once a turn from which on it may be a weight."""
-SAME = 2e-3
-"""Part of a count that the step in a log, of differences of rounded positions, may be off."""
 FINEST = 1e-8
 """m: finer steps are those of printed digits."""
 BY_A_RIG = "stickslip rig run "
@@ -183,24 +170,22 @@ def counts_of(record: Record) -> int:
         return 0
     if not step > 0.0:
         return 0
-    counts = 2.0 * math.pi / step
-    if is_linear([record]):
+    linear = is_linear([record])
+    counts = counts_of_step(step, linear)
+    if linear:
         near = float(f"{step:.2g}")
         printed = near == float(f"1e{math.floor(math.log10(near) + 0.5)}")
-        scale = step > FINEST and not printed and abs(step - near) < SAME * near
-        return round(2.0 * math.pi / near) if scale else 0
-    for near in (2 ** round(math.log2(counts)), 1000 * round(counts / 1000.0)):
-        if near and counts < 1e6 and abs(counts - near) < SAME * near:
-            return int(near)
-    return 0
+        scale = step > FINEST and not printed and abs(step - near) < SAME_COUNTS * near
+        return counts if scale else 0
+    known = counts % 1000 == 0 or counts & (counts - 1) == 0
+    return counts if known and 0 < counts < 1e6 else 0
 
 
 def another_record(
     found: Identification, missing: Sequence[str], files: Sequence[str], model_file: str
 ) -> list[Step]:  # fmt: skip
     """How to record and identify what is missing."""
-    kinds = [EXPERIMENTS.get(n.partition("[")[0].rpartition(".")[2], "sliding") for n in missing]
-    runs = list(dict.fromkeys(kinds))[:2]
+    runs = list(dict.fromkeys(map(experiment_for, missing)))[:2]
     steps = rig_runs(runs, f"To settle {', '.join(missing)}")
     if not files or found.method not in ("axis", "inverse dynamics"):
         return steps

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from stickslip.control.learned import told
 from stickslip.control.registry import control_law
 from stickslip.model import Model
-from stickslip.recommend.candidates import Candidate, Setting
+from stickslip.recommend.beside import Beside
+from stickslip.recommend.candidates import Candidate
 from stickslip.recommend.course import measured
 from stickslip.recommend.notes import ALLOWANCE
 from stickslip.recommend.recommendation import Recommendation
@@ -21,7 +22,8 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
     out = [f"{'law':<16}{'structure':<13}{'gain':>5}  {deadband}  {'error left':>10}  {'worst':>7}  safe"]
     for c in result.candidates:
         x = c.setting
-        mark = "<- " if result.chosen and (x.label, x.kind, x.gain, x.deadband) == same(result.chosen) else ""
+        taken = result.switched_on
+        mark = "<- " if taken and (x.label, x.kind, x.gain, x.deadband) == same(taken) else ""
         out.append(f"{x.label:<16}{x.kind:<13}{x.gain:>5.3g}  {x.deadband:>{wide}.3g}  {100 * c.errors[0]:>8.1f} %  "
               f"{100 * c.worst:>5.1f} %  {mark}{safety(c)}")  # fmt: skip
     out.append("")
@@ -43,20 +45,22 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
     out.append(f"linear controller: {gains}; RMS error alone {result.linear_error:.3g} {unit('rad')}")
     if result.rings:
         out.append(f"linear alone:      without a compensator it oscillates {result.rings}")
-        if result.chosen:
+        if result.chosen or result.instead:
             out.append(
                 f"{'':19}below, safe means that the compensator adds no oscillation to this one; it does not end it"
             )
-    return [*out, *chosen_lines(result, unit), *beside_lines(result), *result.notes]
+    return [*out, *beside_lines(result), *chosen_lines(result, unit), *result.notes]
 
 
 def chosen_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str]:
     """What is switched on, and what to expect of it; nothing where no compensator is."""
+    if result.instead is not None:
+        return instead_lines(result, result.instead)
     c = result.chosen
     if c is None or result.model is None:
         return []
     x = c.setting
-    out = [f"switch on:         {named(x)}"]
+    out = [f"switch on:         {x.words}"]
     if x.compensates:
         out.append(f"parameters:        {parameters(result.model, unit)}")
         out.append(f"lead:              {x.lead:.4g} s")
@@ -68,13 +72,6 @@ def chosen_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str
         out += [f"of this:           {said}" for said in without_friction(result)]
         out.append(f"gain margin:       {margin(c, result)}")
     return out
-
-
-def named(setting: Setting) -> str:
-    """What is switched on, in words."""
-    if not setting.compensates:
-        return "inertia feedforward alone, without friction compensation"
-    return f"{setting.kind} of law {setting.law!r}, gain {setting.gain:g}"
 
 
 def without_friction(result: Recommendation) -> Iterator[str]:
@@ -115,7 +112,7 @@ def taken_away(left: float) -> str:
 
 
 def beside_lines(result: Recommendation) -> list[str]:
-    """Compensators of the catalogue: what each leaves of the error, or why it is not switched on; what is learned."""
+    """Compensators of the catalogue: the error that each leaves, or why it is not switched on."""
     if not result.beside:
         return []
     out = ["", f"{'compensator':<22}{'error left':>10}  {'worst':>7}  switched on"]
@@ -127,16 +124,23 @@ def beside_lines(result: Recommendation) -> list[str]:
         why = b.why_not or ("it leaves hardly less" if hardly else "another one leaves less")
         mark = "<- yes" if b is result.instead else f"no: {why}"
         out.append(f"{b.label:<22}{numbers}  {mark}")
-    taken = result.instead
-    if taken is None:
-        return [*out, "none of these is better than what is said above"]
+    return [*out, ""]
+
+
+def instead_lines(result: Recommendation, taken: Beside) -> list[str]:
+    """What is switched on where it is a compensator of the catalogue, what it leaves, and what it has learned."""
     said = (
         f"it leaves at most {100 * taken.at_most:.1f} % of the linear controller's error on all sampled axes, up to "
         f"{100 * min(ALLOWANCE * taken.at_most, 1.0):.1f} % with what is not simulated"
     )
-    why = f"; the setting above {result.hunts}" if result.hunts else ""
+    best = result.chosen
+    if best is not None:
+        other = result.hunts or f"leaves up to {100 * best.worst:.1f} %"
+        other = f"; the best setting of a law ({best.setting.words}) {other}"
+    else:
+        other = "; no setting of a law is safe and worth it"
     learned = [f"learned there:     {line}" for line in told({"learned": taken.learned})]
-    return [*out, f"switch on instead: {taken.label}; {said}{why}", *learned]
+    return [f"switch on:         {taken.label}; {said}{other}", *learned]
 
 
 def safety(c: Candidate) -> str:

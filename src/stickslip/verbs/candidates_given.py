@@ -110,4 +110,5 @@ def run_by(drive: Drive, own: Controller, name: str) -> Controller:
     return replace(
         own, sample_time=drive.sample_time, encoder_counts=drive.encoder_counts,
         torque_limit=min(own.torque_limit, drive.torque_limit),
+        reference_velocity=own.reference_velocity or drive.reference_velocity,
     )  # fmt: skip

@@ -73,7 +73,9 @@ def recommended_on(content: Table, model: Model, options: CompensatorOptions) ->
             "run `stickslip recommend` with that sample time"
         )
     made = replace(found.on(model), substeps=1 if options.substeps is None else options.substeps)
-    return Controller(Gains(kp=0.0), made, sample_time=tried or asked or 1e-3)
+    return Controller(
+        Gains(kp=0.0), made, sample_time=tried or asked or 1e-3, reference_velocity=found.reference_velocity
+    )
 
 
 def recommendation_in(content: Table) -> Recommended:

@@ -13,6 +13,7 @@ import numpy as np
 
 from stickslip import plugins
 from stickslip.arguments import arguments_checked
+from stickslip.control.own_loop import loop_text
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import Diagnosis
@@ -27,14 +28,14 @@ from stickslip.model import Model
 from stickslip.readers.convert import pendulum_before_gear
 from stickslip.readers.cut import file_rows
 from stickslip.readers.derive import positioned
-from stickslip.record import Record, row_period
+from stickslip.record import Record, encoder_step, row_period
 from stickslip.report.identified import Source
 from stickslip.spec import Law
 from stickslip.verbs.examiner import Examiner
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, named, open_log
 
-Loops = str | Mapping[str, float] | Sequence[str | Mapping[str, float]] | None
+Loops = str | Mapping[str, float | str] | Sequence[str | Mapping[str, float | str]] | None
 
 
 @arguments_checked
@@ -304,7 +305,7 @@ def loops_of(loop: Loops, count: int) -> list[str]:
         raise InputError(
             f"--loop: {loop!r} names no gain; give them, such as --loop kp=8,kd=0.08, or leave it out"
         )
-    texts = [x if isinstance(x, str) else ",".join(f"{k}={float(v)!r}" for k, v in x.items()) for x in every]
+    texts = [loop_text(x) for x in every]
     return texts if len(texts) > 1 else texts * count
 
 
@@ -314,13 +315,15 @@ def with_loop(record: Record, loop: str) -> Record:
 
 
 def about(record: Record) -> dict[str, Any]:
-    """File, hash and size of a record."""
+    """File, hash and size of a record, the time between its rows (s), and the step of its positions (rad or m)."""
     reading: dict[str, Any] = record.meta.get("reading", {})
     said: dict[str, Any] = {
         "file": str(reading.get("file", "")), "sha256": reading.get("sha256", ""), "rows": len(record)
     }  # fmt: skip
     if period := row_period(record):
         said["sample_time"] = period
+    if "position" in record.channels and (step := encoder_step(record["position"])) > 0.0:
+        said["position_step"] = step
     kept = ", ".join(f"{a}:{b}" for a, b in reading.get("kept_rows", [])[:20])
     return {**said, "rows_of_file": kept} if kept else said
 

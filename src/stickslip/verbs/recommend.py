@@ -11,17 +11,17 @@ from typing import Any, Literal
 
 from stickslip.approval import allow_code
 from stickslip.arguments import arguments_checked
-from stickslip.config import named_numbers
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller, sample_time_in
 from stickslip.control.linear import Cascade, Gains
-from stickslip.control.own_loop import kind_of_loop
+from stickslip.control.own_loop import ReferenceVelocity, kind_of_loop, split_loop
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
 from stickslip.recommend import recommend as setting
 from stickslip.recommend.candidate_run import Drive
+from stickslip.recommend.resolution import encoder_for
 from stickslip.recommend.sample_time import refuse_filter, sample_time_for
 from stickslip.verbs.candidates_given import Given, compensators_of, made_for
 from stickslip.verbs.compare import IdentifiedModel, identified_of
@@ -47,11 +47,12 @@ def recommend(
     bandwidth: float | None = 10.0,
     damping: float | None = 1.0,
     linear: Literal["PD", "PID", "PR"] = "PD",
-    loop: str | Mapping[str, float] | None = None,
+    loop: str | Mapping[str, float | str] | None = None,
     controller: Controller | str | os.PathLike[str] | None = None,
     machine: Machine | str | os.PathLike[str] | None = None,
     sample_time: float | None = None,
     delay: float | None = None,
+    reference_velocity: ReferenceVelocity | None = None,
     counts_per_rev: float | None = None,
     torque_limit: float = math.inf,
     motion: Log | None = None,
@@ -84,7 +85,7 @@ def recommend(
     loop : str or mapping, optional
         The drive's own loop instead: kp (N·m/rad), ki, kd, kr of a PID, or kv (1/s), kvp (N·m·s/rad), kvi (N·m/rad),
         feed (part of the reference velocity fed forward) of position P around velocity PI; with filter (Hz,
-        first-order low-pass on its velocity) and limit (N·m).
+        first-order low-pass on its velocity), limit (N·m) and reference_velocity, as below.
     controller : Controller or path, optional
         The drive's own loop made of control laws instead, observers and all, but without friction laws; a path is that
         of a file with a table [controller].
@@ -99,9 +100,14 @@ def recommend(
     delay : float, optional
         Samples by which a command acts late, as on a bus of two or three cycles; drawn, up to one sample, unless given.
         A `machine` has its own.
+    reference_velocity : {"difference", "instant"}, optional
+        How the drive forms its reference velocity: as the difference of two reference positions, or as the
+        trajectory's velocity at the sample. Not stated, the best estimate has the difference, and the sampled axes have
+        either.
     counts_per_rev : float, optional
-        Of the encoder; 0: exact. The machine's, or 0. Of a linear axis the counts in 2π m: 2π over the scale's step
-        in m, 12.57e6 for 0.5 µm.
+        Of the encoder; 0: exact. The machine's or the controller's, else by the position step of the identified record,
+        else exact; a note says which. Of a linear axis the counts in 2π m: 2π over the scale's step in m, 12.57e6 for
+        0.5 µm.
     torque_limit : float
         N·m
     motion : log, optional
@@ -150,31 +156,36 @@ def recommend(
     tried = compensators_of(compensators)
     found = identified_of(model)
     at_hand = load_machine(machine) if isinstance(machine, (str, os.PathLike)) else machine
-    if at_hand is not None:
-        counts_per_rev = at_hand.encoder.counts if counts_per_rev is None else counts_per_rev
+    known_counts = (
+        at_hand.encoder.counts if at_hand is not None and counts_per_rev is None else counts_per_rev
+    )
     path, told = None, tuple[str, ...]()
     if motion is not None:
         path, told = motion_in(
-            motion, MotionGiven(motion_map, counts_per_rev or 0.0, remember, found.unit("rad"))
+            motion, MotionGiven(motion_map, known_counts or 0.0, remember, found.unit("rad"))
         )
     if controller is not None:
         refuse_beside(controller, loop=loop, linear=linear, bandwidth=bandwidth, damping=damping)
 
         def holding(made: Controller, told_by: str) -> Drive:
+            counts, source = encoder_for(found, counts_per_rev, at_hand, made.encoder_counts)
             return Drive(
-                sample_time=made.sample_time, encoder_counts=counts_per_rev or made.encoder_counts,
+                sample_time=made.sample_time, encoder_counts=counts, encoder_from=source,
                 torque_limit=torque_limit, amplitude=amplitude, frequency=frequency or 0.5, motion=path,
                 controller=made, sample_time_from=told_by,
+                reference_velocity=one_of(reference_velocity, made.reference_velocity, "the controller"),
             )  # fmt: skip
 
         drive = drive_with(controller, holding, found, inertia, sample_time, at_hand)
     else:
-        gains, corner, limit = own_loop(loop, torque_limit)
+        gains, corner, limit, stated = own_loop(loop, torque_limit)
+        counts, source = encoder_for(found, counts_per_rev, at_hand)
+        formed = one_of(reference_velocity, stated, "--loop")
 
         def sampled(period: float, told_by: str = "") -> Drive:
             return Drive(
-                bandwidth, damping, period, counts_per_rev or 0.0, limit, amplitude, frequency or 0.5, linear, gains,
-                corner, path, sample_time_from=told_by,
+                bandwidth, damping, period, counts, limit, amplitude, frequency or 0.5, linear, gains, corner, path,
+                sample_time_from=told_by, encoder_from=source, reference_velocity=formed,
             )  # fmt: skip
 
         known_inertia = inertia or found.axis.get("inertia")
@@ -299,33 +310,53 @@ def drive_with(
     return sampled(*sample_time_for(found, sample_time, machine, sampled, known))
 
 
+def one_of(
+    given: ReferenceVelocity | None, own: ReferenceVelocity | None, owner: str
+) -> ReferenceVelocity | None:
+    """How the drive forms its reference velocity: as given, or as its loop says.
+
+    Raises
+    ------
+    InputError
+        If both differ.
+    """
+    if given is not None and own is not None and given != own:
+        raise InputError(f"--reference-velocity {given}, and {owner} states {own}; leave one of them out")
+    return given or own
+
+
 def own_loop(
-    given: str | Mapping[str, float] | None, torque_limit: float
-) -> tuple[Gains | Cascade | None, float, float]:
-    """Gains of the drive's own loop, None without one; the corner of its filter, Hz; and the limit, N·m.
+    given: str | Mapping[str, float | str] | None, torque_limit: float
+) -> tuple[Gains | Cascade | None, float, float, ReferenceVelocity | None]:
+    """Return the gains of the drive's own loop, None without one; the corner of its filter, Hz; the limit, N·m; and how
+    it forms its reference velocity, if that is stated.
 
     Raises
     ------
     InputError
         As of `loop_of`, or if the loop has a limit and another one was given.
     """
-    gains, own = (None, dict[str, float]()) if given is None else loop_of(given)
+    if given is None:
+        return None, 0.0, torque_limit, None
+    gains, own, formed = loop_of(given)
     if "limit" in own and math.isfinite(torque_limit):
         raise InputError(
             f"--torque-limit {torque_limit:g} and the limit of --loop exclude each other; give one of them"
         )
-    return gains, own.get("filter", 0.0), own.get("limit", torque_limit)
+    return gains, own.get("filter", 0.0), own.get("limit", torque_limit), formed
 
 
-def loop_of(given: str | Mapping[str, float]) -> tuple[Gains | Cascade, dict[str, float]]:
-    """Gains of a loop as the drive has it, and its filter and limit.
+def loop_of(
+    given: str | Mapping[str, float | str],
+) -> tuple[Gains | Cascade, dict[str, float], ReferenceVelocity | None]:
+    """Return the gains of a loop as the drive has it, its filter and limit, and how it forms its reference velocity.
 
     Raises
     ------
     InputError
         If a name is unknown, both kinds of loop are mixed, or a number is out of bounds.
     """
-    numbers = named_numbers(given.split(",")) if isinstance(given, str) else dict(given)
+    numbers, formed = split_loop(given)
     kind = kind_of_loop(numbers, ("filter", "limit"))
     for name, value in numbers.items():
         above = value > 0.0 if name == "limit" else value >= 0.0 and math.isfinite(value)
@@ -336,4 +367,4 @@ def loop_of(given: str | Mapping[str, float]) -> tuple[Gains | Cascade, dict[str
     if kind is Gains and not numbers.get("kp", 0.0) > 0.0:
         raise InputError(f"--loop {given}: give kp, greater than 0")
     own = {name: numbers.pop(name) for name in ("filter", "limit") if name in numbers}
-    return kind(**numbers), own
+    return kind(**numbers), own, formed

@@ -18,7 +18,7 @@ from stickslip.model import Model
 from stickslip.recommend.file import setting_table, write_setting
 from stickslip.recommend.recommend import Candidate, Recommendation
 from stickslip.report.recommendation_text import (
-    named,
+    instead_lines,
     recommendation_lines,
     reduction,
     safety,
@@ -45,8 +45,8 @@ class RecommendationResult:
 
     @property
     def chosen(self) -> Candidate | None:
-        """The setting and its errors; None: switch no compensator on."""
-        return self.recommendation.chosen
+        """The setting to switch on, and its errors; None: none, or a compensator of the catalogue (`controller`)."""
+        return self.recommendation.switched_on
 
     @property
     def model(self) -> Model:
@@ -55,10 +55,15 @@ class RecommendationResult:
         Raises
         ------
         InputError
-            Where no compensator is recommended.
+            Where no compensator is recommended, or a whole controller.
         """
+        if self.recommendation.instead is not None:
+            raise InputError(
+                f"{self.recommendation.instead.label} is recommended, which is a whole controller; take controller"
+            )
         if self.recommendation.model is None:
-            raise InputError(f"no compensator is recommended: {'; '.join(self.notes)}")
+            why = in_python(self.recommendation.why_none, "recommend")
+            raise InputError(f"no compensator is recommended: {why}")
         return self.recommendation.model
 
     @property
@@ -138,7 +143,7 @@ class RecommendationResult:
             return f"<RecommendationResult: {self.recommendation.instead.label}>"
         if self.chosen is None:
             return "<RecommendationResult: no compensator>"
-        return f"<RecommendationResult: {named(self.chosen.setting)}>"
+        return f"<RecommendationResult: {self.chosen.setting.words}>"
 
     def _repr_html_(self) -> str:
         """A table of the candidates in a notebook, and what is recommended."""
@@ -146,7 +151,9 @@ class RecommendationResult:
         head = "".join(f"<th>{h}</th>" for h in names)
         rows = "".join(_row(c) for c in self.candidates)
         said = (
-            "; of this, ".join(
+            instead_lines(self.recommendation, instead)[0].partition(":")[2].strip()
+            if (instead := self.recommendation.instead)
+            else "; of this, ".join(
                 [f"Error reduction: {reduction(self.recommendation)}", *without_friction(self.recommendation)]
             )
             if self.chosen

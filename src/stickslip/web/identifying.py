@@ -9,6 +9,7 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 
+from stickslip.control.own_loop import REFERENCE_VELOCITIES
 from stickslip.web.asking import Refused, Table, body, chosen_names, number, text
 from stickslip.web.jobs import Job
 from stickslip.web.projects import Item, Project, words
@@ -208,6 +209,9 @@ def recommend_options(data: dict[str, Any]) -> dict[str, Any]:
             out[name] = int(count)
     if data.get("linear"):
         out["linear"] = chosen_names([data["linear"]], "linear", ("PD", "PID", "PR"))[0]
+    if data.get("reference_velocity"):
+        kind = chosen_names([data["reference_velocity"]], "reference_velocity", REFERENCE_VELOCITIES)
+        out["reference_velocity"] = kind[0]
     if data.get("loop") not in (None, ""):
         out["loop"] = text(data, "loop")[:500]
     return out

@@ -151,7 +151,6 @@ def picture_data(picture: Any) -> dict[str, Any]:
 
 def recommend(request: Request, say: Said) -> dict[str, Any]:
     """Recommend a setting for a model; writes recommended.toml and result.json."""
-    from stickslip.report.recommendation_text import named
     from stickslip.verbs.recommend import recommend as run
 
     item = Item(Path(request["folder"]))
@@ -168,7 +167,7 @@ def recommend(request: Request, say: Said) -> dict[str, Any]:
     if found.chosen is not None:
         units |= {f.name: unit(f.par.unit) for f in found.model.law.fields}
     written_whole(item.folder / "result.json", plain({**found.as_dict(), "text": str(found), "units": units}))
-    words = named(found.chosen.setting) if found.chosen else ""
+    words = found.chosen.setting.words if found.chosen else ""
     return {"chosen": found.chosen is not None, "words": words}
 
 

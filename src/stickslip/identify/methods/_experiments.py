@@ -6,9 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from stickslip.config import named_numbers
 from stickslip.control.linear import Cascade, Gains
-from stickslip.control.own_loop import kind_of_loop
+from stickslip.control.own_loop import kind_of_loop, split_loop
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.experiment import DRIVES, Experiment, experiment_of
 from stickslip.identify.methods.method import Options
@@ -117,9 +116,14 @@ def with_extra(record: Record, channel: str, loop: str) -> Record:
     return replace(record, channels={**record.channels, "motor_torque": total})
 
 
-def loop_of(given: str | Mapping[str, float]) -> Loop:
+def loop_of(given: str | Mapping[str, float | str]) -> Loop:
     """The sampled controller of ``kp=..,kd=..`` or ``kv=..,kvp=..``, or of a mapping with these names."""
-    numbers = named_numbers(given.split(",")) if isinstance(given, str) else dict(given)
+    numbers, reference_velocity = split_loop(given)
+    if reference_velocity == "instant":
+        raise InputError(
+            "--loop: reference_velocity = instant is not in a record, whose reference is known at its rows only: the "
+            "loop is simulated with the difference of two rows; leave it out"
+        )
     kind_of_loop(numbers, BESIDE_GAINS)
     for name, value in numbers.items():
         above = math.isfinite(value) or name == "limit"

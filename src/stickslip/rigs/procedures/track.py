@@ -149,7 +149,7 @@ class Track(Procedure):
             # The rig measures by its own encoder, whatever counts it was tried with.
             return dataclasses.replace(
                 made, gains=loop.linear, velocity_filter=loop.velocity_filter,
-                torque_limit=min(made.torque_limit, loop.torque_limit),
+                torque_limit=min(made.torque_limit, loop.torque_limit), reference_velocity=loop.reference_velocity,
             )  # fmt: skip
         if self.linear not in LINEAR:
             raise UnknownName("linear controller", self.linear, LINEAR)

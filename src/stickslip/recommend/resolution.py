@@ -1,0 +1,64 @@
+"""The resolution of the drive's encoder, and where it is from: given, the machine's, the controller's, the record's."""
+
+from __future__ import annotations
+
+import math
+
+from stickslip.errors import InputError
+from stickslip.identify.identified_file import Identified
+from stickslip.machines.machine import Machine
+from stickslip.record import counts_of_step
+
+OWN = "give --counts-per-rev (Python: counts_per_rev=)"
+
+
+def encoder_for(
+    found: Identified, given: float | None, machine: Machine | None = None, controller: float = 0.0
+) -> tuple[float, str]:
+    """Return the counts of the encoder per revolution (of a linear axis per 2 pi m; 0: exact), and where they are from.
+
+    Parameters
+    ----------
+    found : Identified
+        The model, whose records may show the step of the position.
+    given : float, optional
+        Counts that the user states.
+    machine : Machine, optional
+        At hand.
+    controller : float
+        Counts that the controller of the user's file or object has; 0: none.
+
+    Raises
+    ------
+    InputError
+        If the given number is no number of counts.
+    """
+    if given is not None:
+        if not (given == 0.0 or 1.0 <= given < math.inf):
+            raise InputError(
+                f"--counts-per-rev {given:g} must be at least 1 and finite, or 0 for exact positions; leave it out to "
+                "take the resolution of the record"
+            )
+        return given, "as given"
+    if machine is not None:
+        return machine.encoder.counts, f"that of the machine {machine.name}"
+    if controller > 0.0:
+        return controller, "that of the controller"
+    step, file = found.position_step
+    if step > 0.0:
+        record = f"the record {file}" if file else "the identified record"
+        return float(counts_of_step(step, found.motion == "linear")), (
+            f"the position step of {record} ({step:.3g} {found.unit('rad')}); if the drive's encoder is another one, "
+            f"{OWN}"
+        )
+    return 0.0, (
+        "assumed, as the model does not contain the position step of its record: with an encoder another setting may "
+        f"be safe, or none; {OWN}"
+    )
+
+
+def resolution_words(counts: float, linear: bool) -> str:
+    """Return the resolution in words."""
+    if not counts:
+        return "exact positions"
+    return f"an encoder of {counts:.10g} counts per {'2π m' if linear else 'revolution'}"
