@@ -19,6 +19,8 @@ from typing import Any, Self, cast
 from stickslip.errors import ConfigError, InputError, ModelRemark, suggestion
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+SHOWN = 5
+"""Unknown keys of a table that are named, at most."""
 RUN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,63}")
 
 
@@ -129,12 +131,30 @@ class Table:
         except InputError as error:
             raise ConfigError(f"{self.label()}: {error}") from None
 
-    def close(self) -> None:
-        """Refuse the keys that were not asked for."""
-        for key in self.values:
-            if key not in self._known:
-                remedy = suggestion(key, self._known, f"allowed are {', '.join(self._known) or 'none'}")
-                raise ConfigError(f"{self.label(key)}: unknown key; {remedy}")
+    def close(self, elsewhere: Mapping[str, str] | None = None) -> None:
+        """Refuse the keys that were not asked for, all in one line.
+
+        Parameters
+        ----------
+        elsewhere : mapping of str to str, optional
+            Keys of other tables of this file and their tables: a key in the wrong place gets the right one.
+        """
+        unknown = [key for key in self.values if key not in self._known]
+        if not unknown:
+            return
+        otherwise = f"allowed are {', '.join(self._known) or 'none'}"
+        said = [f"unknown key; {suggestion(k, self._known, otherwise, elsewhere)}" for k in unknown[:SHOWN]]
+        first, *others = zip(unknown, said, strict=False)
+        more = [f"{key}: {words}" for key, words in others]
+        if len(unknown) > SHOWN:
+            more.append(f"and {len(unknown) - SHOWN} more unknown keys")
+        raise ConfigError("; ".join([f"{self.label(first[0])}: {first[1]}", *more]))
+
+    def refuse_unknown(self, known: Iterable[str], elsewhere: Mapping[str, str] | None = None) -> None:
+        """Refuse every key that is not `known`; `elsewhere` as in `close`."""
+        for key in known:
+            self.has(key)
+        self.close(elsewhere)
 
     def __enter__(self) -> Self:
         return self

@@ -119,8 +119,6 @@ def identified_in(table: Table) -> Identified:
     except (TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{file}: its estimates cannot be read ({error}); identify the axis again") from None
     axis = dict(content.get("axis", {}))
-    if isinstance(axis.get("inertia", 0.0), (str, bool, list, dict)):
-        raise InputError(f"{file}: axis.inertia = {axis['inertia']!r} must be a number in kg·m² (kg)")
     return Identified(
         file, model, estimates, np.where(np.isfinite(matrix), matrix, np.eye(len(estimates))),
         axis, str(content.get("motion", "rotary")), tuple(content.get("data", [])),
