@@ -30,8 +30,8 @@ TOP_KEYS = (
 )  # fmt: skip
 """Keys of a model's file; the last three are what `stickslip recommend` and `stickslip rig commission` add."""
 AXIS_NUMBERS = (
-    "inertia", "offset", "gravity", "gravity_angle", "drive_gain", "back_emf", "load_motor", "load_external", "backlash",
-    "gear_ratio",
+    "inertia", "offset", "gravity", "gravity_angle", "drive_gain", "back_emf", "load_motor", "load_external",
+    "backlash", "gear_ratio",
 )  # fmt: skip
 TABLE_KEYS = {
     "axis": (*AXIS_NUMBERS, "seen_from"),
@@ -241,7 +241,10 @@ def refuse_unknown_keys(table: Table, law: Law | None = None) -> None:
     """
     tables = {"axis": TABLE_KEYS["axis"]}
     if law is not None:
-        tables |= {"choices": tuple(c.name for c in law.choices), "parameters": tuple(f.name for f in law.fields)}
+        tables |= {
+            "choices": tuple(c.name for c in law.choices),
+            "parameters": tuple(f.name for f in law.fields),
+        }
     elsewhere = {key: name for name, keys in tables.items() for key in keys}
     table.refuse_unknown(TOP_KEYS, elsewhere)
     for name, keys in TABLE_KEYS.items():

@@ -42,7 +42,7 @@ def test_what_a_model_file_does_not_have_is_named(
     joint.write_text(content)
     with pytest.raises(InputError, match=re.escape(said)):
         ss.Model.from_file(joint)
-    for call in (["export", str(joint), "--to", "urdf"], ["recommend", str(joint)], ["machine", str(joint)]):
+    for call in (["export", str(joint), "--to", "urdf"], ["recommend", str(joint)]):
         assert main(call) == 2
         message = capsys.readouterr().err
         assert said in message
@@ -50,7 +50,9 @@ def test_what_a_model_file_does_not_have_is_named(
 
 
 def test_a_study_names_the_choice_that_a_parameter_needs() -> None:
-    with pytest.raises(InputError, match="no parameter 'fc_negative'; it needs the choice symmetry = \"asymmetric\""):
+    with pytest.raises(
+        InputError, match="no parameter 'fc_negative'; it needs the choice symmetry = \"asymmetric\""
+    ):
         ss.Model("coulomb", fc=0.5, fc_negative=0.4)
 
 

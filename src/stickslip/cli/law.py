@@ -185,26 +185,24 @@ def check(law: Any) -> int:
 
 def with_values(law: Law, settings: Sequence[str]) -> Model:
     """The law with its example's parameters and the values that were set."""
+    from stickslip.config import named_values
     from stickslip.model import Model
 
-    given = dict(setting(text) for text in settings)
+    given = {name: value_in(text) for name, text in named_values(settings, "--set").items()}
     names = {choice.name for choice in law.choices}
     choices = {k: v for k, v in given.items() if k in names and isinstance(v, str)}
     chosen = law.having(**choices) if choices else law
     return Model(chosen, **{**chosen.example, **{k: v for k, v in given.items() if k not in choices}})
 
 
-def setting(text: str) -> tuple[str, Any]:
-    """Name and value of NAME=VALUE; the value is as in a TOML file, a word needs no quotes."""
+def value_in(text: str) -> Any:
+    """Return a value as a TOML file would have it; a word needs no quotes."""
     import tomllib
 
-    name, equals, value = text.partition("=")
-    if not equals or not name.strip() or not value.strip():
-        raise InputError(f"--set {text!r} must be NAME=VALUE, such as fs=0.3 or k=[1e4,5e3]")
     try:
-        return name.strip(), tomllib.loads(f"value = {value}")["value"]
+        return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
-        return name.strip(), value.strip()
+        return text
 
 
 def shown_values(model: Model, plain: Law, settings: Sequence[str]) -> dict[str, Any]:

@@ -325,7 +325,11 @@ def loop_of(given: str | Mapping[str, float]) -> tuple[Gains | Cascade, dict[str
     InputError
         If a name is unknown, both kinds of loop are mixed, or a number is out of bounds.
     """
-    numbers = named_numbers(given.split(",")) if isinstance(given, str) else dict(given)
+    numbers = (
+        named_numbers(given.split(","), "--loop", infinite=("limit",))
+        if isinstance(given, str)
+        else dict(given)
+    )
     kind = kind_of_loop(numbers, ("filter", "limit"))
     for name, value in numbers.items():
         above = value > 0.0 if name == "limit" else value >= 0.0 and math.isfinite(value)

@@ -119,7 +119,11 @@ def with_extra(record: Record, channel: str, loop: str) -> Record:
 
 def loop_of(given: str | Mapping[str, float]) -> Loop:
     """The sampled controller of ``kp=..,kd=..`` or ``kv=..,kvp=..``, or of a mapping with these names."""
-    numbers = named_numbers(given.split(",")) if isinstance(given, str) else dict(given)
+    numbers = (
+        named_numbers(given.split(","), "--loop", infinite=("limit",))
+        if isinstance(given, str)
+        else dict(given)
+    )
     kind_of_loop(numbers, BESIDE_GAINS)
     for name, value in numbers.items():
         above = math.isfinite(value) or name == "limit"
