@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor.view import View
+from stickslip.identify.doctor.view import NEVER, View
 from stickslip.record import encoder_step
 
 
@@ -100,11 +100,17 @@ def reversed_and_slow(view: View, stribeck_velocity: float | None = None) -> Ite
     unit = "rad" if view.record.units.get("position") == "rad" else "m"
     direction = np.sign(smooth.velocity[smooth.moving])
     if direction.size and np.all(direction == direction[0]):
+        far, back = max(smooth.travel), min(smooth.travel)
+        moves = (
+            "the axis never reverses"
+            if back < NEVER * far
+            else f"the axis moves {far:.3g} {unit} in one direction and at most {back:.3g} {unit} in the other"
+        )
         yield Finding(
             "warning",
             "no-reversal",
-            "the axis never reverses: friction of the other direction and hysteresis stay unknown, and friction is "
-            "not told from a constant torque (weight, offset)",
+            f"{moves}: friction of the other direction and hysteresis stay unknown, and friction cannot be "
+            "distinguished from a constant torque (weight, offset)",
             remedy="add motion in the other direction",
         )
     travel = float(np.ptp(smooth.position))
