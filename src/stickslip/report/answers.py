@@ -370,7 +370,7 @@ def within_speeds(regression: Regression, unit: str) -> str:
 
 
 def plain_there(found: Identification, sliding: Sliding) -> str:
-    """Return what plain least squares leaves in the same rows, as the end of a sentence, with the reason if it is less."""
+    """Return what plain least squares leaves in the same rows, and the reason if it is less, to end a sentence."""
     if not math.isfinite(sliding.plain):
         return ""
     own, plain = sliding.relative, sliding.plain * sliding.relative / max(sliding.rms, 1e-300)
@@ -381,7 +381,7 @@ def plain_there(found: Identification, sliding: Sliding) -> str:
 
 
 def why_plain_leaves_less(found: Identification) -> str:
-    """Return why the error of plain least squares is lower: it minimizes this error alone, by one number most of all."""
+    """Return why the error of plain least squares is lower: it minimizes this error alone, mostly by one number."""
     reason, inverse = "which minimizes this error alone", found.details.get("inverse")
     mechanics = found.details.get("mechanics")
     if (

@@ -76,13 +76,15 @@ def _standing(view: View, channel: str) -> Finding | None:
     steps = np.unique(np.abs(np.diff(values)))
     steps = steps[steps > 1e-12 * max(span, 1e-300)]
     smallest = float(steps[0]) if steps.size else 0.0
-    if span == 0.0 or (span <= 2.01 * smallest and np.unique(values).size <= 3):
-        return Finding(
-            "error",
-            "never-moved",
-            f"{channel} stays within {span:.3g} {unit}: the axis {'hardly' if span > 0.0 else 'never'} moved",
-            remedy=remedy,
+    places = np.unique(values).size
+    if span == 0.0 or (span <= 2.01 * smallest and places <= 3):
+        message = (
+            f"{channel} is {values[0]:g} {unit} throughout: the axis never moved"
+            if span == 0.0
+            else f"{channel} has only {places} values, over {span:.3g} {unit}: the axis hardly moved, or the encoder "
+            "is too coarse to show the motion"
         )
+        return Finding("error", "never-moved", message, remedy=remedy)
     if float(np.var(np.diff(values))) > 1.2 * float(np.var(values)) and encoder_step(values) < 0.1 * span:
         message = (
             f"{channel} is noise of {float(np.std(values)):.3g} {unit} about a fixed value: the axis never"

@@ -299,7 +299,7 @@ def seen_through(signals: Signals, window: Window) -> SlidingRows:
     places = np.flatnonzero(clear[::stride]) * stride
     if places.size < FEWEST:
         raise InputError(
-            f"gross sliding lasts {longest_run(~doubtful) * period:.3g} s at a time at most, of which "
+            f"too little gross sliding: it lasts {longest_run(~doubtful) * period:.3g} s at a time at most, of which "
             f"{places.size * stride * period:.3g} s in all are far enough from reversals and stops for a window of "
             f"{2 * window.reach * period:.3g} s; record longer motion in one direction, a finer position, or rows "
             "more often"
