@@ -19,6 +19,10 @@ def no_regression(*_: Any, **__: Any) -> Any:
     raise InputError("left out")
 
 
+def times(count: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    return np.asarray(PERIOD * np.arange(count), dtype=np.float64)
+
+
 def record(speeds: tuple[tuple[float, float], ...], sign: float = 1.0, ripple: float = 0.0) -> Record:
     """Speeds with smooth changes between them; J = 0.02 kg·m², F_C = 0.3 N·m, sigma2 = 0.05 N·m·s/rad."""
     steps = np.concatenate([np.full(int(seconds / PERIOD), speed) for speed, seconds in speeds])
@@ -30,7 +34,7 @@ def record(speeds: tuple[tuple[float, float], ...], sign: float = 1.0, ripple: f
         0.02 * np.gradient(v, PERIOD) + 0.3 * np.tanh(v / 1e-3) + 0.05 * v + ripple * np.sin(7.0 * q) + noise
     )
     channels = {"position": q, "motor_torque": sign * torque}
-    return Record(PERIOD * np.arange(v.size), channels, {"position": "rad", "motor_torque": "N·m"})
+    return Record(times(v.size), channels, {"position": "rad", "motor_torque": "N·m"})
 
 
 def findings(examined: Record) -> dict[str, str]:
@@ -64,14 +68,16 @@ def test_one_direction_never_reverses() -> None:
 def test_constant_speed_is_no_encoder_step() -> None:
     """Equal changes from row to row were reported as a position that moves in steps of 0.01 rad."""
     assert "quantisation" not in findings(record(((5.0, 10.0),)))
-    t = PERIOD * np.arange(5000)
-    for exact in (5.0 * t, np.where(t < 5.0, 5.0 * t, 50.0 - 5.0 * t)):
-        assert encoder_step(exact) == 0.0
-    assert encoder_step(np.round(0.5 * t / 0.004) * 0.004) == pytest.approx(0.004)
+    t = times(5000)
+    for exact in (5.0 * t, np.minimum(5.0 * t, 50.0 - 5.0 * t)):
+        assert encoder_step(np.asarray(exact, dtype=np.float64)) == 0.0
+    assert encoder_step(np.asarray(np.round(0.5 * t / 0.004) * 0.004, dtype=np.float64)) == pytest.approx(
+        0.004
+    )
 
 
 def test_two_values_are_no_motion_within_their_distance() -> None:
     flips = np.sign(np.sin(np.arange(4000) * 0.002) + 1e-9)
     channels = {"position": flips, "motor_torque": np.cos(np.arange(4000) * 0.002)}
-    found = findings(Record(PERIOD * np.arange(4000), channels, {"position": "rad", "motor_torque": "N·m"}))
+    found = findings(Record(times(4000), channels, {"position": "rad", "motor_torque": "N·m"}))
     assert found["never-moved"].startswith("position has only 2 values, over 2 rad")

@@ -20,13 +20,13 @@ def stair(speeds: tuple[tuple[float, float], ...]) -> tuple[np.ndarray, np.ndarr
     steps = np.concatenate([np.full(int(seconds / PERIOD), speed) for speed, seconds in speeds])
     window = np.hanning(51) / np.sum(np.hanning(51))
     v = np.convolve(np.pad(steps, 25, mode="edge"), window, "valid")
-    return PERIOD * np.arange(v.size), v
+    return np.asarray(PERIOD * np.arange(v.size), dtype=np.float64), v
 
 
 def test_cogging_is_named_where_it_is_the_reason() -> None:
     """ "It does not follow its torque as one inertia does" was printed two lines below the cogging."""
     rng = np.random.default_rng(2)
-    t = PERIOD * np.arange(3000)
+    t = np.asarray(PERIOD * np.arange(3000), dtype=np.float64)
     q = 1.2 * np.sin(2.0 * math.pi * t) + 0.12 * np.sin(4.6 * math.pi * t)
     v = np.gradient(q, t)
     torque = 0.0005 * np.gradient(v, t) + 0.02 * np.tanh(v / 1e-3) + 0.001 * v + 0.2 * np.sin(7.0 * q + 0.3)
