@@ -33,7 +33,7 @@ def record(speeds: tuple[tuple[float, float], ...], sign: float = 1.0, ripple: f
     torque = (
         0.02 * np.gradient(v, PERIOD) + 0.3 * np.tanh(v / 1e-3) + 0.05 * v + ripple * np.sin(7.0 * q) + noise
     )
-    channels = {"position": q, "motor_torque": sign * torque}
+    channels: dict[str, Any] = {"position": q, "motor_torque": sign * torque}
     return Record(times(v.size), channels, {"position": "rad", "motor_torque": "N·m"})
 
 
@@ -78,6 +78,6 @@ def test_constant_speed_is_no_encoder_step() -> None:
 
 def test_two_values_are_no_motion_within_their_distance() -> None:
     flips = np.sign(np.sin(np.arange(4000) * 0.002) + 1e-9)
-    channels = {"position": flips, "motor_torque": np.cos(np.arange(4000) * 0.002)}
+    channels: dict[str, Any] = {"position": flips, "motor_torque": np.cos(np.arange(4000) * 0.002)}
     found = findings(Record(times(4000), channels, {"position": "rad", "motor_torque": "N·m"}))
     assert found["never-moved"].startswith("position has only 2 values, over 2 rad")

@@ -400,8 +400,13 @@ def why_plain_leaves_less(found: Identification) -> str:
         return reason
     name = max(shared, key=lambda n: abs(plain[n] - own[n]) * sizes[n])
     unit = unit_in(found, {"inertia": "kg·m²", "sigma2": "N·m·s/rad"}.get(name, "N·m"))
-    impossible = ", which is impossible" if plain[name] < 0.0 and name != "offset" else ""
-    return f"{reason}, by {name} = {plain[name]:.3g} {unit} in place of {own[name]:.3g}{impossible}"
+    instead, given = (f"{values[name]:.3g}" for values in (plain, own))
+    impossible = " (impossible)" if plain[name] < 0.0 and name != "offset" else ""
+    return (
+        reason
+        if instead == given
+        else f"{reason}, by {name} = {instead} {unit}{impossible} in place of {given}"
+    )
 
 
 def force_errors(misfit: Mapping[str, float], reason: str = "which minimizes this error alone") -> list[str]:
