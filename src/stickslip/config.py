@@ -10,7 +10,7 @@ import math
 import re
 import tomllib
 import warnings
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +19,8 @@ from typing import Any, Self, cast
 from stickslip.errors import ConfigError, InputError, ModelRemark, suggestion
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+SHOWN = 5
+"""Unknown keys of a table that are named, at most."""
 RUN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,63}")
 
 
@@ -129,12 +131,30 @@ class Table:
         except InputError as error:
             raise ConfigError(f"{self.label()}: {error}") from None
 
-    def close(self) -> None:
-        """Refuse the keys that were not asked for."""
-        for key in self.values:
-            if key not in self._known:
-                remedy = suggestion(key, self._known, f"allowed are {', '.join(self._known) or 'none'}")
-                raise ConfigError(f"{self.label(key)}: unknown key; {remedy}")
+    def close(self, elsewhere: Mapping[str, str] | None = None) -> None:
+        """Refuse the keys that were not asked for, all in one line.
+
+        Parameters
+        ----------
+        elsewhere : mapping of str to str, optional
+            Keys of other tables of this file and their tables: a key in the wrong place gets the right one.
+        """
+        unknown = [key for key in self.values if key not in self._known]
+        if not unknown:
+            return
+        otherwise = f"allowed are {', '.join(self._known) or 'none'}"
+        said = [f"unknown key; {suggestion(k, self._known, otherwise, elsewhere)}" for k in unknown[:SHOWN]]
+        first, *others = zip(unknown, said, strict=False)
+        more = [f"{key}: {words}" for key, words in others]
+        if len(unknown) > SHOWN:
+            more.append(f"and {len(unknown) - SHOWN} more unknown keys")
+        raise ConfigError("; ".join([f"{self.label(first[0])}: {first[1]}", *more]))
+
+    def refuse_unknown(self, known: Iterable[str], elsewhere: Mapping[str, str] | None = None) -> None:
+        """Refuse every key that is not `known`; `elsewhere` as in `close`."""
+        for key in known:
+            self.has(key)
+        self.close(elsewhere)
 
     def __enter__(self) -> Self:
         return self
@@ -297,21 +317,77 @@ def _show(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def named_numbers(pairs: Sequence[str]) -> dict[str, float]:
-    """Read NAME=VALUE.
+def named_values(
+    pairs: Iterable[str], option: str, value: str = "VALUE", *, nameless: bool = False
+) -> dict[str, str]:
+    """Read what an option gives as NAME=VALUE.
+
+    Parameters
+    ----------
+    pairs : iterable of str
+    option : str
+        Its name, "--set", for messages.
+    value : str
+        What stands for the value in its help.
+    nameless : bool
+        Whether a value may have no name; its name is then empty.
 
     Raises
     ------
     InputError
-        If one has no "=" or no number.
+        If a pair has no name or no value, or one name has two values.
     """
-    out: dict[str, float] = {}
+    out: dict[str, str] = {}
+    form = f"[NAME=]{value}" if nameless else f"NAME={value}"
     for pair in pairs:
-        name, equals, number = pair.partition("=")
-        try:
-            out[name.strip()] = float(number)
-        except ValueError:
-            equals = ""
-        if not equals:
-            raise InputError(f"{pair!r} must be NAME=VALUE with a number in SI units")
+        name, equals, text = (part.strip() for part in pair.partition("="))
+        if nameless and not equals:
+            name, text = "", name
+        if not text or not (name or nameless):
+            raise InputError(f"{option} {pair!r} must be {form}")
+        if out.get(name, text) != text:
+            remedy = f"give {name} once" if name else f"give each a name, {option} NAME={value}"
+            raise InputError(f"{option} gives both {out[name]} and {text}; {remedy}")
+        out[name] = text
     return out
+
+
+def named_numbers(
+    pairs: Iterable[str], option: str, unit: str = "SI units", *, value: str = "VALUE", nameless: bool = False,
+    infinite: Iterable[str] = (),
+) -> dict[str, float]:  # fmt: skip
+    """Read what an option gives as NAME=NUMBER; `infinite` are names whose number may be infinite.
+
+    Raises
+    ------
+    InputError
+        As `named_values`, or if a value is no number or not finite.
+    """
+    given = named_values(pairs, option, value, nameless=nameless)
+    return {
+        name: _number_of(
+            text, f"{option} {name}={text}" if name else f"{option} {text}", unit, name in infinite
+        )
+        for name, text in given.items()
+    }
+
+
+def listed_numbers(text: str, option: str, unit: str) -> list[float]:
+    """Read the numbers between commas of an option.
+
+    Raises
+    ------
+    InputError
+        If a part is no number or not finite.
+    """
+    return [_number_of(part, f"{option} {text}", unit) for part in text.split(",")]
+
+
+def _number_of(text: str, said: str, unit: str, infinite: bool = False) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        raise InputError(f"{said}: {text.strip()!r} must be a number in {unit}") from None
+    if math.isnan(number) or (math.isinf(number) and not infinite):
+        raise InputError(f"{said}: {text.strip()} must be a finite number in {unit}")
+    return number

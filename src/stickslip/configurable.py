@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import types
 from collections import namedtuple
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Self, cast
 
 from stickslip.arguments import arguments_checked, no_number
@@ -34,7 +34,7 @@ class Described(Findable):
         names = [f.name for f in self.fields]
         for name in values:
             if name not in names:
-                raise ParameterError(f"{self.name}: no parameter {name!r}; {suggestion(name, names)}")
+                raise ParameterError(f"{self.name}: no parameter {name!r}; {self.remedy_for(name)}")
         given = {f.name: values.get(f.name, values.get(f.like, f.par.default)) for f in self.fields}
         checked = {f.name: self._checked(f, given[f.name]) for f in self.fields}
         for per in dict.fromkeys(f.par.per for f in self.fields if f.per_element):
@@ -47,6 +47,10 @@ class Described(Findable):
         if complaint:
             raise ParameterError(f"{self.name}: {complaint}")
         return p
+
+    def remedy_for(self, name: str, others: Iterable[str] = ()) -> str:
+        """Return what to write in place of a parameter that this does not have; `others` are allowed in its place."""
+        return suggestion(name, [*(f.name for f in self.fields), *others])
 
     def _checked(self, f: Field, value: Any) -> Any:
         if value is None:
@@ -193,6 +197,21 @@ class Configurable(Described):
     def option_of(self, choice: str) -> str:
         """The name of the option in force for a choice; "" where the law has no choice of that name."""
         return self.chosen.get(choice, self._defaults.get(choice, ""))
+
+    def added_fields(self) -> Iterator[tuple[str, str, tuple[Field, ...]]]:
+        """Yield every option that is not in force and adds or changes parameters: choice, option, these parameters."""
+        for choice in self.choices:
+            for name in choice.options:
+                fields = tuple(f for f in self.having(**{choice.name: name}).fields if f not in self.fields)
+                if fields:
+                    yield choice.name, name, fields
+
+    def remedy_for(self, name: str, others: Iterable[str] = ()) -> str:
+        """Return what to write in place of a parameter that this does not have: one of an option needs that option."""
+        for choice, option, fields in self.added_fields():
+            if name in {f.name for f in fields}:
+                return f'it needs the choice {choice} = "{option}"'
+        return super().remedy_for(name, others)
 
     @functools.cached_property
     def _defaults(self) -> dict[str, str]:

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -192,10 +192,24 @@ def _error(kind: type[StickslipError], args: tuple[Any, ...]) -> StickslipError:
     return kind.__new__(kind, *args)
 
 
-def suggestion(name: str, known: Iterable[str], otherwise: str = "") -> str:
-    """Return the remedy for a misspelt `name`: up to three near ones, or else `otherwise` or all of them."""
-    names = list(known)
-    near = [repr(n) for n in difflib.get_close_matches(name, names, n=3, cutoff=0.6)]
+def suggestion(
+    name: str, known: Iterable[str], otherwise: str = "", tables: Mapping[str, str] | None = None
+) -> str:
+    """Return the remedy for a misspelt `name`: up to three near ones, or else `otherwise` or all of them.
+
+    Parameters
+    ----------
+    name : str
+    known : iterable of str
+    otherwise : str
+    tables : mapping of str to str, optional
+        Further names, and the tables of the file in which these are keys.
+    """
+    names, places = list(known), tables or {}
+    found = difflib.get_close_matches(name, [*names, *places], n=3, cutoff=0.6)
+    if name in found:
+        found = [name]
+    near = [repr(n) if n in names else f"{n!r} in [{places[n]}]" for n in dict.fromkeys(found)]
     if near:
         *others, last = near
         return f"did you mean {', '.join(others)} or {last}?" if others else f"did you mean {last}?"

@@ -50,6 +50,11 @@ class Finding:
         return cls(**{str(key): value for key, value in data.items()})
 
 
+def times(count: int) -> str:
+    """Return how often something occurs, in words: "once", "3 times"."""
+    return "once" if count == 1 else f"{count} times"
+
+
 def sorted_findings(findings: Iterable[Finding]) -> list[Finding]:
     """Errors first, then warnings, then notes; in the order found otherwise."""
     return sorted(findings, key=lambda finding: LEVELS.index(finding.level))

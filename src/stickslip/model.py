@@ -23,6 +23,23 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 MODEL_FORMAT = "stickslip-model-1"
 """What a file that `stickslip identify` wrote says it is."""
+TOP_KEYS = (
+    "format", "law", "parameters", "choices", "axis", "motion", "method", "notes", "measure_next", "position_map",
+    "drivetrain", "angle", "misfit", "estimates", "assumed", "correlation", "data", "versions", "trust", "doubts",
+    "evidence", "speeds", "trajectory", "recommended", "controller", "laws",
+)  # fmt: skip
+"""Keys of a model's file; the last three are what `stickslip recommend` and `stickslip rig commission` add."""
+AXIS_NUMBERS = (
+    "inertia", "offset", "gravity", "gravity_angle", "drive_gain", "back_emf", "load_motor", "load_external",
+    "backlash", "gear_ratio",
+)  # fmt: skip
+TABLE_KEYS = {
+    "axis": (*AXIS_NUMBERS, "seen_from"),
+    "speeds": ("positive", "negative"),
+    "trajectory": ("source", "time", "position", "velocity"),
+    "correlation": ("names", "matrix"),
+}
+"""Keys of the tables in it that a person may write too."""
 
 SHOWN = 6
 """Numbers of a parameter that are printed one by one, at most."""
@@ -109,12 +126,15 @@ class Model:
         law = plugins.law(name, table.label("law"))
         choices = dict(table.table("choices").values) if table.has("choices") else dict[str, Any]()
         with table.blamed():
+            variant = law.having(**choices)
+            refuse_unknown_keys(table, variant)
+            refuse_odd_axis(table)
             parameters = table.table("parameters")
             values = parameters.rest()
-            known = {f.name for f in law.having(**choices).fields}
+            known = {f.name for f in variant.fields}
             for key in values:
                 if key not in known:
-                    raise parameters.error(key, f"is no parameter of this law; {suggestion(key, known)}")
+                    raise parameters.error(key, f"is no parameter of this law; {variant.remedy_for(key)}")
             made = cls(law, choices, **values)
             # What an identification found was remarked upon there; nobody mistook one number for another.
             return made if "format" in table.values else made.warn(file)
@@ -203,6 +223,49 @@ class Model:
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         return _model, (self.law, self.parameters._asdict())
+
+
+def refuse_unknown_keys(table: Table, law: Law | None = None) -> None:
+    """Refuse keys that a model's file does not have, with the nearest that it has, whatever table that is in.
+
+    Parameters
+    ----------
+    table : Table
+        The whole file.
+    law : Law, optional
+        Under the file's choices; None for a file without a law.
+
+    Raises
+    ------
+    ConfigError
+    """
+    tables = {"axis": TABLE_KEYS["axis"]}
+    if law is not None:
+        tables |= {
+            "choices": tuple(c.name for c in law.choices),
+            "parameters": tuple(f.name for f in law.fields),
+        }
+    elsewhere = {key: name for name, keys in tables.items() for key in keys}
+    table.refuse_unknown(TOP_KEYS, elsewhere)
+    for name, keys in TABLE_KEYS.items():
+        if isinstance(table.values.get(name), dict):
+            own = {k: v for k, v in elsewhere.items() if v != name}
+            table.table(name).refuse_unknown(keys, own)
+
+
+def refuse_odd_axis(table: Table) -> None:
+    """Refuse a model's file whose kind of motion or numbers of the axis cannot be used.
+
+    Raises
+    ------
+    ConfigError
+    """
+    table.choice("motion", ("rotary", "linear"), "rotary")
+    if table.has("axis"):
+        axis = table.table("axis")
+        for key in AXIS_NUMBERS:
+            axis.number(key, "SI units", 0.0)
+        axis.choice("seen_from", ("motor", "load"), "load")
 
 
 def _model(law: Law, values: Mapping[str, Any]) -> Model:

@@ -8,7 +8,7 @@ from typing import Any
 from stickslip import plugins
 from stickslip.config import Table
 from stickslip.control_spec import ControlLaw
-from stickslip.errors import ConfigError, suggestion
+from stickslip.errors import ConfigError
 from stickslip.model import Model
 from stickslip.spec import Described, Law
 
@@ -101,7 +101,7 @@ def refuse_unknown(
     names = [f.name for f in described.fields]
     for key in values:
         if key not in names:
-            remedy = suggestion(key, [*names, *others])
+            remedy = described.remedy_for(key, others)
             raise ConfigError(f"{table.label(key)}: {described.name} has no parameter {key!r}; {remedy}")
 
 

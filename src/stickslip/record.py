@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+FEWEST_CHANGES = 20
+"""Changes of a position, and rows in which they differ from the one before, that determine an encoder's step."""
 ZIP = b"PK"
 """How an .npz file begins."""
 
@@ -174,10 +176,13 @@ def encoder_step(position: Array) -> float:
     """The step of which the position's changes from row to row are whole multiples, in its unit; 0 where there is none.
 
     Changes of up to 50 steps are looked at: those of a faster motion are known no better than the noise of one step.
+    Changes that stay equal from row to row, as of a computed motion at constant speed, do not determine a step.
     """
-    changes = np.abs(np.diff(position))
-    changes = changes[changes > 1e-12 * float(np.max(np.abs(position), initial=1e-300))]
-    if changes.size < 20:
+    all_changes = np.abs(np.diff(position))
+    changes = all_changes[all_changes > 1e-12 * float(np.max(np.abs(position), initial=1e-300))]
+    if changes.size < FEWEST_CHANGES:
+        return 0.0
+    if np.count_nonzero(np.abs(np.diff(all_changes)) > 0.5 * float(np.min(changes))) < FEWEST_CHANGES:
         return 0.0
     step = float(np.min(changes))
     # The mean over the changes by one step is sharper than the smallest of them.

@@ -62,7 +62,7 @@ SIBLINGS = [
     (["identify", "good.csv", *IDENTIFY, "--counts-per-rev", "nan"], "--counts-per-rev nan must be a number"),
     (["doctor", "good.csv", "--torque-constant", "nan"], "--torque-constant nan must be a number"),
     (["identify", "good.csv", *IDENTIFY, "--loop", "kp=1"], "--loop needs the reference position"),
-    (["identify", "closed.csv", *IDENTIFY, "--loop", "kp=nan"], "--loop: kp = nan must be a finite number"),
+    (["identify", "closed.csv", *IDENTIFY, "--loop", "kp=nan"], "--loop kp=nan: nan must be a finite number"),
     (["identify", "closed.csv", *IDENTIFY, "--loop", "kp=-7,kd=0.1"], "kp = -7 must be a finite number of 0 or more"),
     (["identify", "closed.csv", *IDENTIFY, "--loop", "kp=1,span=0"], "span = 0 must be 1 or 2"),
     (["identify", "closed.csv", *IDENTIFY, "--loop", "kp=1,limit=-1"], "limit = -1 must be greater than 0"),

@@ -287,7 +287,7 @@ def test_in_one_direction_no_constant_torque_is_told_from_friction(seed):
     forth = cut(back, Cut(end=3.9))
     found = {f.code: f.message for f in examine(forth).findings}
     assert "offset" not in found
-    assert "friction is not told from a constant torque" in found["no-reversal"]
+    assert "friction cannot be distinguished from a constant torque" in found["no-reversal"]
 
 
 def test_who_knows_better_says_accept(tmp_path, capsys):

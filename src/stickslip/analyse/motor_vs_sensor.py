@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyse.spectrum import channel_of
-from stickslip.errors import InputError
+from stickslip.errors import InputError, ParameterError
 from stickslip.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -106,6 +106,8 @@ def sides(records: Mapping[str, Record], inertia: float = 0.0) -> Sides:
     InputError
         If a record has no sensor, or none moves.
     """
+    if not 0.0 <= inertia < math.inf:
+        raise ParameterError(f"sides: inertia = {inertia:g} kg·m² must be a finite number of 0 or more")
     points: list[Point] = []
     parts: list[Array] = []
     for name, record in records.items():

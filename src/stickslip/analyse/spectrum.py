@@ -180,8 +180,12 @@ def spectrum(
     ------
     ParameterError, InputError
     """
-    if resolution is not None and not resolution > 0.0:
-        raise ParameterError(f"spectrum: resolution = {resolution:g} Hz must be greater than 0")
+    named = {f"modes[{label!r}]": f for label, f in (modes or {}).items()}
+    for words, hertz in {**named, **({} if resolution is None else {"resolution": resolution})}.items():
+        if not 0.0 < hertz < math.inf:
+            raise ParameterError(f"spectrum: {words} = {hertz:g} Hz must be a finite number greater than 0")
+    if not start < end:
+        raise ParameterError(f"spectrum: start = {start:g} s must be before end = {end:g} s")
     values, unit = channel_of(record, channel)
     inside = (record.time >= start) & (record.time <= end)
     part = Record(record.time[inside], {channel: values[inside]}, {channel: unit})

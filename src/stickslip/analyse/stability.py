@@ -38,6 +38,7 @@ from stickslip.analyse.stability_result import (
 )
 from stickslip.control.linear import Gains
 from stickslip.control.short_form import highest_corner
+from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
 from stickslip.model import Model
 
@@ -204,6 +205,9 @@ def stability(
     ------
     ParameterError
     """
+    for corner in filters:
+        if not 0.0 <= corner < math.inf:
+            raise ParameterError(f"stability: filter = {corner:g} Hz must be a finite number of 0 or more")
     alone = replace(drive, law=FREE, filter_hz=0.0)
     rows = [_margins("", axis, alone, None)]
     rows += [

@@ -69,25 +69,6 @@ def _opened(args: argparse.Namespace) -> list[tuple[str, Record]]:
     return out
 
 
-def _numbers(option: str, text: str, unit: str) -> list[float]:
-    """Numbers between commas."""
-    from stickslip.errors import InputError
-
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"{option} {text!r} must be comma-separated numbers in {unit}") from None
-
-
-def _named(option: str, texts: Sequence[str], unit: str) -> dict[str, float]:
-    """Numbers with names, NAME=NUMBER; a name may be left out."""
-    out: dict[str, float] = {}
-    for text in texts:
-        name, _, value = text.rpartition("=")
-        out[name] = _numbers(option, value, unit)[0]
-    return out
-
-
 def _show(args: argparse.Namespace, found: Sequence[Any], picture: Callable[[], Any]) -> None:
     """Lines or JSON, and the picture where one is wanted."""
     from stickslip.cli import _output
@@ -130,8 +111,9 @@ def _spectrum_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _spectrum(args: argparse.Namespace) -> None:
     from stickslip.analyse.spectrum import spectrum
+    from stickslip.config import named_numbers
 
-    modes = _named("--mode", args.mode, "Hz")
+    modes = named_numbers(args.mode, "--mode", "Hz", value="HZ")
     found = [
         spectrum(
             record, args.channel, modes=modes, resolution=args.resolution, start=args.start, end=args.end, name=name
@@ -195,12 +177,14 @@ def _flexibility_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _flexibility(args: argparse.Namespace) -> None:
     from stickslip.analyse.flexibility import flexibility
+    from stickslip.config import listed_numbers, named_numbers
 
-    inertias = _numbers("--inertia", args.inertia, "kg·m²")
+    inertias = listed_numbers(args.inertia, "--inertia", "kg·m²")
     found = flexibility(
-        _numbers("--stiffness", args.stiffness, "N·m/rad"), sum(inertias),
-        torques=_named("--torque", args.torque, "N·m"), inertias=inertias if len(inertias) > 1 else (),
-        claimed=_numbers("--claimed", args.claimed, "Hz") if args.claimed else (),
+        listed_numbers(args.stiffness, "--stiffness", "N·m/rad"), sum(inertias),
+        torques=named_numbers(args.torque, "--torque", "N·m", value="NM", nameless=True),
+        inertias=inertias if len(inertias) > 1 else (),
+        claimed=listed_numbers(args.claimed, "--claimed", "Hz") if args.claimed else (),
     )  # fmt: skip
 
     def picture() -> Any:

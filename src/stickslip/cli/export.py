@@ -109,6 +109,7 @@ def compensator_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the files; 1 if the check fails."""
     from stickslip.cli import _output
+    from stickslip.config import named_values
     from stickslip.errors import InputError
     from stickslip.export import TARGETS, target_named
     from stickslip.export.maps import MAP_TARGETS
@@ -131,7 +132,7 @@ def run(args: argparse.Namespace) -> int:
     made = export(
         args.file, args.to, name=args.name, single=args.single, controller=args.controller,
         compensator=args.compensator, nearest=args.nearest, top_speed=args.top_speed,
-        settings=settings_given(args.set), check=args.check, position_map=args.position_map, **numbers,
+        settings=named_values(args.set, "--set"), check=args.check, position_map=args.position_map, **numbers,
     )  # fmt: skip
     folder: Path = args.out or Path(f"{made.name}-{made.target.name}")
     _files.refuse_foreign([folder / name for name in made.files], args.force)
@@ -149,19 +150,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(made)
     return 1 if made.check and made.check.passed is False else 0
-
-
-def settings_given(pairs: list[str]) -> dict[str, str]:
-    """Settings of the target, NAME=VALUE."""
-    from stickslip.errors import InputError
-
-    given: dict[str, str] = {}
-    for text in pairs:
-        key, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"--set {text}: write NAME=VALUE")
-        given[key] = value
-    return given
 
 
 def described(target: Target) -> list[str]:

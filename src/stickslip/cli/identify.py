@@ -28,7 +28,7 @@ from stickslip.cli import _files, _reading
 from stickslip.identify.methods import METHODS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from stickslip.report.answers import Answers
     from stickslip.verbs.identification import IdentificationResult
@@ -227,15 +227,35 @@ def profiles(result: IdentificationResult) -> list[str]:
     return [path for path in found if path]
 
 
+def values_given(options: Mapping[str, Sequence[str]]) -> dict[str, float]:
+    """Return the values of parameters by name; --freeze and --free may leave a value out.
+
+    Raises
+    ------
+    InputError
+        If two options give one parameter different values.
+    """
+    from stickslip.config import named_numbers
+    from stickslip.errors import InputError
+
+    out: dict[str, float] = {}
+    for option, pairs in options.items():
+        for name, value in named_numbers([p for p in pairs if "=" in p or option == "--set"], option).items():
+            if out.get(name, value) != value:
+                raise InputError(
+                    f"{option} {name}={value:g} contradicts {name}={out[name]:g}; give one of them"
+                )
+            out[name] = value
+    return out
+
+
 def options_of(args: argparse.Namespace) -> dict[str, Any]:
     """What `stickslip.verbs.identify.identify` takes besides how logs are read."""
     from stickslip.cli import _output
-    from stickslip.config import named_numbers
 
-    fixed = (*args.freeze, *args.free)
     return {
         "method": args.method, "law": args.law, "hold_out": args.validation, "model": args.model, "noise": args.noise,
-        "values": named_numbers([*args.set, *(p for p in fixed if "=" in p)]),
+        "values": values_given({"--set": args.set, "--freeze": args.freeze, "--free": args.free}),
         "frozen": [p.partition("=")[0] for p in args.freeze], "free": [p.partition("=")[0] for p in args.free],
         "inertia": args.inertia,
         "torque_channel": args.torque or "", "elements": args.elements, "threshold": args.threshold,

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -106,13 +106,9 @@ def describe(law: Law, args: argparse.Namespace) -> int:
     table("parameters", model.law.fields)
     table("state", law.state_fields)
     print_choices(law)
-    print(f"passive: {law.passive or 'not stated'}\n{source_line(law)}\n\nas a study's file has it:")
+    print(f"passive: {law.passive or 'not stated'}\n{source_line(law)}")
     written = args.name if args.name.endswith(".py") else law.name
-    print(f"  law = {json.dumps(written, ensure_ascii=False)}")
-    for name, option in model.law.chosen.items():
-        print(f'  {name} = "{option}"')
-    for name, value in shown_values(model, args.set).items():
-        print(f"  {name} = {value}")
+    print_files(written, model, shown_values(model, law, args.set))
     if picture:
         from stickslip.report.law_pictures import draw_law
 
@@ -120,6 +116,18 @@ def describe(law: Law, args: argparse.Namespace) -> int:
         _files.written([picture])
         print(f"\npicture: {picture}")
     return 0
+
+
+def print_files(name: str, model: Model, values: Mapping[str, Any]) -> None:
+    """Print the law as a table of a study and as a file of its own."""
+    named = f"law = {json.dumps(name, ensure_ascii=False)}"
+    chosen = [f'{choice} = "{option}"' for choice, option in model.law.chosen.items()]
+    numbers = [f"{key} = {value}" for key, value in values.items()]
+    print("\nas a study's file has it:")
+    print("\n".join(f"  {line}" for line in (named, *chosen, *numbers)))
+    print("\nas a model's file has it (model.toml):")
+    choices = ("", "[choices]", *chosen) if chosen else ()
+    print("\n".join(f"  {line}".rstrip() for line in (named, *choices, "", "[parameters]", *numbers)))
 
 
 def describe_control(law: ControlLaw, args: argparse.Namespace) -> int:
@@ -154,8 +162,8 @@ def print_choices(law: Configurable) -> None:
         print(f"{choice.name}: {options}")
     if choices:
         print()
-        for option, fields in brought(law):
-            table(f"with {option}", fields)
+        for choice, option, fields in law.added_fields():
+            table(f"with {choice} = {option}", fields)
 
 
 def check(law: Any) -> int:
@@ -175,44 +183,32 @@ def check(law: Any) -> int:
     return 1 if failures else 0
 
 
-def brought(law: Configurable) -> Iterator[tuple[str, tuple[Field, ...]]]:
-    """The parameters that an option adds to those of the default."""
-    from stickslip.spec import fields_of
-
-    for choice in law.choices:
-        for name, option in choice.options.items():
-            fields = fields_of(option.params)
-            if fields and name != choice.default:
-                yield f"{choice.name} = {name}", fields
-
-
 def with_values(law: Law, settings: Sequence[str]) -> Model:
     """The law with its example's parameters and the values that were set."""
+    from stickslip.config import named_values
     from stickslip.model import Model
 
-    given = dict(setting(text) for text in settings)
+    given = {name: value_in(text) for name, text in named_values(settings, "--set").items()}
     names = {choice.name for choice in law.choices}
     choices = {k: v for k, v in given.items() if k in names and isinstance(v, str)}
     chosen = law.having(**choices) if choices else law
     return Model(chosen, **{**chosen.example, **{k: v for k, v in given.items() if k not in choices}})
 
 
-def setting(text: str) -> tuple[str, Any]:
-    """Name and value of NAME=VALUE; the value is as in a TOML file, a word needs no quotes."""
+def value_in(text: str) -> Any:
+    """Return a value as a TOML file would have it; a word needs no quotes."""
     import tomllib
 
-    name, equals, value = text.partition("=")
-    if not equals or not name.strip() or not value.strip():
-        raise InputError(f"--set {text!r} must be NAME=VALUE, such as fs=0.3 or k=[1e4,5e3]")
     try:
-        return name.strip(), tomllib.loads(f"value = {value}")["value"]
+        return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
-        return name.strip(), value.strip()
+        return text
 
 
-def shown_values(model: Model, settings: Sequence[str]) -> dict[str, Any]:
-    """The example's parameters and those that were set, as plain data."""
+def shown_values(model: Model, plain: Law, settings: Sequence[str]) -> dict[str, Any]:
+    """Return the parameters of the example, those that were set and those that the chosen options add."""
     named = {*model.law.example, *(text.partition("=")[0].strip() for text in settings)}
+    named |= {f.name for f in model.law.fields if f not in plain.fields}
     values: dict[str, Any] = model.parameters._asdict()
     return {
         f.name: list(values[f.name]) if f.per_element else values[f.name]
@@ -232,7 +228,7 @@ def table(title: str, fields: tuple[Field, ...]) -> None:
             f.par.symbol,
             f.par.unit,
             f.par.bounds,
-            "" if f.par.default is None else f"default {f.par.default:g}",
+            f"default {f.like}" if f.like else "" if f.par.default is None else f"default {f.par.default:g}",
             f.par.meaning,
         )
         for f in fields

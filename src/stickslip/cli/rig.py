@@ -124,7 +124,7 @@ def rig_of(args: argparse.Namespace) -> Rig:
     ------
     InputError
     """
-    from stickslip.config import read_toml
+    from stickslip.config import named_numbers, read_toml
     from stickslip.errors import InputError
     from stickslip.rigs.files import read_rig
     from stickslip.rigs.narrower_limits import limited
@@ -134,21 +134,23 @@ def rig_of(args: argparse.Namespace) -> Rig:
     if name.endswith(".toml") and read_toml(Path(name)).has("rig"):
         if args.without:
             raise InputError("--without is for virtual machines; write it into the file's [rig]")
-        return limited(read_rig(name), numbers(args.limit))
-    return limited(virtual_rig(name, args.without), numbers(args.limit))
+        return limited(read_rig(name), named_numbers(args.limit, "--limit"))
+    return limited(virtual_rig(name, args.without), named_numbers(args.limit, "--limit"))
 
 
 def performed(args: argparse.Namespace) -> int:
     """`stickslip rig run`."""
     from stickslip.cli import _output
+    from stickslip.config import named_values
     from stickslip.errors import InputError, unwritable
     from stickslip.rigs.procedures import procedure
     from stickslip.rigs.procedures.base import perform, planned
     from stickslip.study.files import prepared_folder
 
     kind = procedure(args.procedure)
-    chosen = kind.with_options(pairs(args.set))
-    sensible(chosen, pairs(args.set))
+    given = named_values(args.set, "--set")
+    chosen = kind.with_options(given)
+    sensible(chosen, given)
     rig = rig_of(args)
     out: Path = args.out or Path(f"{args.procedure}.npz")
     plan = planned(chosen, rig)
@@ -336,39 +338,3 @@ def shown(result: Performed, out: Path, args: argparse.Namespace) -> int:
             print(*Account(**result.record.meta["loop"]).lines(), sep="\n")
         print(f"record: {out} ({len(result.record)} rows)")
     return 0 if result.passed else 1
-
-
-def numbers(given: list[str]) -> dict[str, float]:
-    """NAME=NUMBER.
-
-    Raises
-    ------
-    InputError
-    """
-    from stickslip.errors import InputError
-
-    out: dict[str, float] = {}
-    for name, text in pairs(given, "--limit").items():
-        try:
-            out[name] = float(text)
-        except ValueError:
-            raise InputError(f"--limit {name}={text!r} must be a number") from None
-    return out
-
-
-def pairs(given: list[str], option: str = "--set") -> dict[str, str]:
-    """NAME=VALUE.
-
-    Raises
-    ------
-    InputError
-    """
-    from stickslip.errors import InputError
-
-    out: dict[str, str] = {}
-    for pair in given:
-        name, equals, value = pair.partition("=")
-        if not equals:
-            raise InputError(f"{option} {pair!r} must be NAME=VALUE")
-        out[name.strip()] = value.strip()
-    return out

@@ -37,9 +37,9 @@ from stickslip.control.own_loop import REFERENCE_VELOCITIES, REFERENCE_VELOCITY,
 from stickslip.control.registry import control_law, control_law_names, law_files
 from stickslip.control.short_tables import OF_GAINS, Placement, compensator_in, gains_in, placement
 from stickslip.control_spec import PLACES, ControlLaw
-from stickslip.errors import ConfigError, ModelRemark, suggestion
+from stickslip.errors import ConfigError, ModelRemark
 from stickslip.model import Model
-from stickslip.model_tables import models
+from stickslip.model_tables import models, refuse_unknown
 
 NUMERICS = ("integrator", "tolerance", "time_step", "output")
 """Keys of a controller's table that are not the controller's: how a simulation integrates it."""
@@ -191,15 +191,12 @@ def block(
         given = table.rest()
         choices = {k: v for k, v in given.items() if k in options and isinstance(v, str)}
         values = {k: v for k, v in given.items() if k not in choices}
-        names = [f.name for f in law.having(**choices).fields]
-        for key in values:
-            if key not in names:
-                remedy = suggestion(key, [*names, *options])
-                raise ConfigError(f"{table.label(key)}: {law.name} has no parameter {key!r}; {remedy}")
+        variant = law.having(**choices)
+        refuse_unknown(table, values, variant, options)
         if poles and law.placed:
             placed = law.placed(inertia, poles.bandwidth, poles.damping)
             values = {**placed, **values}
-        if "inertia" in names:
+        if "inertia" in {f.name for f in variant.fields}:
             values = {"inertia": inertia, **values}
         return ControlBlock(law, friction, choices, **values)
 

@@ -47,7 +47,7 @@ def split_loop(
         entries = [entry.partition("=") for entry in given.split(",")]
         words = {value.strip() for name, _, value in entries if name.strip() == REFERENCE_VELOCITY}
         pairs = ["".join(entry) for entry in entries if entry[0].strip() != REFERENCE_VELOCITY]
-        numbers = named_numbers(pairs)
+        numbers = named_numbers(pairs, "--loop", infinite=("limit",))
     else:
         words = {str(given[REFERENCE_VELOCITY])} if REFERENCE_VELOCITY in given else set[str]()
         numbers = {name: cast("float", x) for name, x in given.items() if name != REFERENCE_VELOCITY}

@@ -43,7 +43,7 @@ def identified_machine(table: Table, name: str) -> Machine:
     """
     friction, content = Model.from_table(table), table.values
     axis = cast("Mapping[str, Any]", content.get("axis", {}))
-    numbers = {key: _number(table, axis, key) for key in ("inertia", "gravity", "gravity_angle")}
+    numbers = {key: float(axis.get(key, 0.0)) for key in ("inertia", "gravity", "gravity_angle")}
     if not numbers["inertia"] > 0.0:
         raise InputError(
             f"{table.document.name} holds no inertia (axis.inertia), so that it is no machine; identify the axis with "
@@ -61,14 +61,6 @@ def identified_machine(table: Table, name: str) -> Machine:
         name, numbers["inertia"], Contact(friction), title="an identified axis", flexible=flexible,
         cogging=weight, notes=tuple(notes),
     )  # fmt: skip
-
-
-def _number(table: Table, axis: Mapping[str, Any], key: str) -> float:
-    """A number of the axis; 0 where there is none."""
-    value = axis.get(key, 0.0)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(f"{table.document.name}: axis.{key} = {value!r} must be a number")
-    return float(value)
 
 
 def train_in(content: Mapping[str, Any], file: str) -> TwoInertias | None:

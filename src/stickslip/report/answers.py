@@ -24,12 +24,14 @@ from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.identify.motion import speeds_of
 from stickslip.identify.regression.drifting import DRIFTS_BY, drift_of
+from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 from stickslip.report.next_steps import Step, next_steps
 from stickslip.report.plots import quantity
 from stickslip.report.sliding_torque import WORSE, Sliding, beaten, beside_held_inertia, sliding_of
+from stickslip.simulation.recorded_input.simulation import Mechanics
 
 ELSEWHERE = 1.5
 """Times the force error of the fitted records, from which on that of held-out ones is one of another machine."""
@@ -223,7 +225,10 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
     """What speaks against the numbers, in a few words each."""
     out, effort = list[str](), "force" if linear(found) else "torque"
     if sliding is not None and sliding.relative > ROUGH:
-        out.append(f"the model misses {percent(sliding.relative)} of the {effort} even where the axis slides")
+        out.append(
+            f"the model misses {percent(sliding.relative)} of the {effort} even where the axis slides"
+            f"{mostly_waves(found, sliding)}"
+        )
     if sliding is not None and beaten(sliding):
         better = f"plain least squares (--inverse) explains the {effort} better where the axis slides"
         out.append(f"{better}{beside_held_inertia(found, unit_in(found, 'kg·m²'))}")
@@ -261,6 +266,15 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
     return out
 
 
+def mostly_waves(found: Identification, sliding: Sliding) -> str:
+    """Return that the torque over the position is most of what the model misses; empty if it is not."""
+    regression = found.details.get("regression")
+    if not isinstance(regression, Regression) or regression.waves**2 < 0.5 * sliding.rms**2:
+        return ""
+    size = quantity(float(np.max(regression.harmonics)), unit_in(found, "N·m"))
+    return f", mostly a torque over the position (cogging, {size}), which no friction law contains"
+
+
 def codes(findings: Iterable[Any]) -> str:
     """The names of findings, each once."""
     return ", ".join(dict.fromkeys(f.code for f in findings))
@@ -282,9 +296,14 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
         out.append(
             f"In gross sliding ({100.0 * sliding.share:.0f} % of the record{speeds}) the model's {effort} is "
             f"{percent(sliding.relative)} off the measured one, {quantity(sliding.rms, unit)} root mean "
-            f"square{plain_there(sliding)}."
+            f"square{plain_there(found, sliding)}."
         )
-    out += force_errors(found.misfit, sliding is not None and not beaten(sliding))
+    reason = (
+        "less at standstills and reversals alone"
+        if sliding is not None and not beaten(sliding)
+        else why_plain_leaves_less(found)
+    )
+    out += force_errors(found.misfit, reason)
     out += either_way(found)
     if (off := found.misfit.get("drive_relative")) is not None:
         out.append(
@@ -350,17 +369,50 @@ def within_speeds(regression: Regression, unit: str) -> str:
     return f", {regression.slowest:.3g} to {regression.fastest:.3g} {unit}"
 
 
-def plain_there(sliding: Sliding) -> str:
-    """What plain least squares leaves in the same rows, as the end of a sentence."""
+def plain_there(found: Identification, sliding: Sliding) -> str:
+    """Return what plain least squares leaves in the same rows, and the reason if it is less, to end a sentence."""
     if not math.isfinite(sliding.plain):
         return ""
-    return f"; plain least squares: {percent(sliding.plain * sliding.relative / max(sliding.rms, 1e-300))}"
+    own, plain = sliding.relative, sliding.plain * sliding.relative / max(sliding.rms, 1e-300)
+    if percent(plain) == percent(own) or plain > own:
+        return f"; plain least squares: {percent(plain)}"
+    reason = why_plain_leaves_less(found) if beaten(sliding) else "not significantly less"
+    return f"; plain least squares: {percent(plain)}, {reason}"
 
 
-def force_errors(misfit: Mapping[str, float], excused: bool = False) -> list[str]:
-    """Force error of training and held-out records beside plain least squares', in sentences.
+def why_plain_leaves_less(found: Identification) -> str:
+    """Return why the error of plain least squares is lower: it minimizes this error alone, mostly by one number."""
+    reason, inverse = "which minimizes this error alone", found.details.get("inverse")
+    mechanics = found.details.get("mechanics")
+    if (
+        not isinstance(inverse, InverseDynamics)
+        or not isinstance(mechanics, Mechanics)
+        or found.model is None
+    ):
+        return reason
+    own = {**found.model.parameters._asdict(), "inertia": mechanics.inertia, "offset": mechanics.offset}
+    speed = float(np.sqrt(np.mean(inverse.velocity**2)))
+    pulls = inverse.matrix[:, inverse.names.index("inertia")]
+    sizes = {"inertia": float(np.sqrt(np.mean(pulls**2))), "sigma2": speed, "fc": 1.0, "offset": 1.0}
+    plain = inverse.numbers()
+    shared = [n for n in sizes if isinstance(own.get(n), float)]
+    if not shared:
+        return reason
+    name = max(shared, key=lambda n: abs(plain[n] - own[n]) * sizes[n])
+    unit = unit_in(found, {"inertia": "kg·m²", "sigma2": "N·m·s/rad"}.get(name, "N·m"))
+    instead, given = (f"{values[name]:.3g}" for values in (plain, own))
+    impossible = " (impossible)" if plain[name] < 0.0 and name != "offset" else ""
+    return (
+        reason
+        if instead == given
+        else f"{reason}, by {name} = {instead} {unit}{impossible} in place of {given}"
+    )
 
-    `excused`: where the axis slides the model is as good, so that its excess comes from standstills and reversals.
+
+def force_errors(misfit: Mapping[str, float], reason: str = "which minimizes this error alone") -> list[str]:
+    """Force error of training and held-out records next to plain least squares', in sentences.
+
+    `reason`: why the error of plain least squares is lower where it is significantly lower.
     """
     out: list[str] = []
     for prefix, where in (
@@ -371,11 +423,11 @@ def force_errors(misfit: Mapping[str, float], excused: bool = False) -> list[str
         plain = float(misfit.get(f"{prefix}inverse_dynamics_relative", math.nan))
         if math.isfinite(own):
             beside = f"; plain least squares: {percent(plain)}" if math.isfinite(plain) else ""
-            more = (
-                ", less at standstills and reversals alone"
-                if own > WORSE * plain and not prefix and excused
-                else ""
-            )
+            more = ""
+            if own > WORSE * plain:
+                more = f", {reason}" if not prefix else ", for the same reason"
+            elif plain < own and percent(plain) != percent(own):
+                more = ", not significantly less"
             out.append(f"{where}: {percent(own)} force error{beside}{more}.")
         elif math.isfinite(plain):
             out.append(f"{where}: {percent(plain)} force error (plain least squares).")

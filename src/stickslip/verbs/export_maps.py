@@ -8,6 +8,7 @@ from pathlib import Path
 from stickslip.config import read_toml
 from stickslip.errors import InputError
 from stickslip.machines.position_map import PositionMap
+from stickslip.model import refuse_unknown_keys
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import kind_of, require
 
@@ -38,6 +39,8 @@ def map_in(source: object, target: str) -> PositionMap:
         path = Path(source)  # type: ignore[reportUnknownArgumentType]
         require(path, "map", "model")
         whole = read_toml(path)
+        if not whole.has("law"):
+            refuse_unknown_keys(whole)
         if whole.has("position_map"):
             found = PositionMap.of(whole.table("position_map").values)
     if found is None:

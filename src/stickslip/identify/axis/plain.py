@@ -62,7 +62,7 @@ def inverse_identification(
         if name.startswith(POSITIVE) and name != "gravity_angle":
             good = low > 0.0 and high <= 2.0 * low
         else:
-            good = 0.5 * (high - low) <= 0.05 * (1.0 if unit == "rad" else abs(found.coulomb))
+            good = 0.5 * (high - low) <= 0.05 * (1.0 if unit == "rad" else max(found.coulomb, 0.0))
         why = "" if good else "its interval is too wide"
         estimates.append(Estimate(name, unit, name, value, spread, low, high, good, why))
     misfit = {"inverse_dynamics_relative": found.relative_error}

@@ -99,7 +99,7 @@ def axis_prediction(
     vector, level = criterion.vector, abs(start.coulomb)
     return prediction_error(
         seen.motions, law, vector, criterion.mechanics, inertia=vector.named(u)["inertia"], friction=level, start=u,
-        signed_scale=vector.signed_scale(level), band=seen.band, seed=seed,
+        signed_scale=vector.signed_scale(start.coulomb), band=seen.band, seed=seed,
     )  # fmt: skip
 
 

@@ -30,7 +30,7 @@ from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.identify.regression.bands import GAUSSIAN
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.regression.reasons import NOT_AS_ONE
+from stickslip.identify.regression.reasons import COGGING, NOT_AS_ONE
 from stickslip.identify.regression.regression import Regression
 from stickslip.identify.regression.strokes import stacked
 from stickslip.machines.servo import ServoAxis
@@ -367,6 +367,8 @@ def advice(estimates: Sequence[Estimate], law: Law, doubt: str = "") -> tuple[st
         out.append(ADVICE)
     elif any(NOT_TOGETHER in e.verdict for e in estimates):
         out.append("Log torque and motion by one clock, without filters of their own.")
+    elif doubt.startswith(COGGING):
+        out.append("Map the torque over the angle on slow turns: `stickslip identify LOG --method cogging`.")
     elif NOT_AS_ONE in doubt:
         out.append("Record longer moves with gentler accelerations: motor and load then move as one.")
     elif "inertia" in missing:

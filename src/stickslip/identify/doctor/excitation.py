@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor.view import View
+from stickslip.identify.doctor.view import NEVER, View
 from stickslip.record import encoder_step
 
 
@@ -79,13 +79,15 @@ def _standing(view: View, channel: str) -> Finding | None:
     steps = np.unique(np.abs(np.diff(values)))
     steps = steps[steps > 1e-12 * max(span, 1e-300)]
     smallest = float(steps[0]) if steps.size else 0.0
-    if span == 0.0 or (span <= 2.01 * smallest and np.unique(values).size <= 3):
-        return Finding(
-            "error",
-            "never-moved",
-            f"{channel} stays within {span:.3g} {unit}: the axis {'hardly' if span > 0.0 else 'never'} moved",
-            remedy=remedy,
+    places = np.unique(values).size
+    if span == 0.0 or (span <= 2.01 * smallest and places <= 3):
+        message = (
+            f"{channel} is {values[0]:g} {unit} throughout: the axis never moved"
+            if span == 0.0
+            else f"{channel} has only {places} values, over {span:.3g} {unit}: the axis hardly moved, or the encoder "
+            "is too coarse to show the motion"
         )
+        return Finding("error", "never-moved", message, remedy=remedy)
     if float(np.var(np.diff(values))) > 1.2 * float(np.var(values)) and encoder_step(values) < 0.1 * span:
         message = (
             f"{channel} is noise of {float(np.std(values)):.3g} {unit} about a fixed value: the axis never"
@@ -103,11 +105,17 @@ def reversed_and_slow(view: View, stribeck_velocity: float | None = None) -> Ite
     unit = "rad" if view.record.units.get("position") == "rad" else "m"
     direction = np.sign(smooth.velocity[smooth.moving])
     if direction.size and np.all(direction == direction[0]):
+        far, back = max(smooth.travel), min(smooth.travel)
+        moves = (
+            "the axis never reverses"
+            if back < NEVER * far
+            else f"the axis moves {far:.3g} {unit} in one direction and at most {back:.3g} {unit} in the other"
+        )
         yield Finding(
             "warning",
             "no-reversal",
-            "the axis never reverses: friction of the other direction and hysteresis stay unknown, and friction is "
-            "not told from a constant torque (weight, offset)",
+            f"{moves}: friction of the other direction and hysteresis stay unknown, and friction cannot be "
+            "distinguished from a constant torque (weight, offset)",
             remedy="add motion in the other direction",
         )
     travel = float(np.ptp(smooth.position))

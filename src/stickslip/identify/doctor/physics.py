@@ -15,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.finding import Finding
-from stickslip.identify.doctor.view import Array, Smooth, View
+from stickslip.identify.doctor.view import NEVER, Array, Smooth, View
 from stickslip.identify.fit.shifts import least_between, shifts_looked_at
 from stickslip.readers.convert import pendulum_before_gear
 
@@ -111,9 +111,8 @@ def _one_way(smooth: Smooth, view: View, turned: str) -> Iterator[Finding]:
     power = smooth.torque * smooth.velocity
     stops = abs(smooth.velocity[-1]) < 0.5 * abs(smooth.velocity[0])
     if float(np.mean(power)) < -0.5 * float(np.mean(np.abs(power))) and not stops:
-        message = (
-            "the axis moves one way only, and the torque brakes it: a load drives it, or the sign is wrong"
-        )
+        only = "one way only" if min(smooth.travel) < NEVER * max(smooth.travel) else "nearly one way only"
+        message = f"the axis moves {only}, and the torque brakes it: a load drives it, or the sign is wrong"
         yield Finding(
             "warning", "torque-sign", message, remedy=f"say {turned}, if positive torque drives backwards"
         )

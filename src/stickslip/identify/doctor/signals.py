@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.finding import Finding, times
 from stickslip.identify.doctor.spikes import LATE, sticking_out
 from stickslip.identify.doctor.view import Array, Mask, View, is_number, row
 from stickslip.readers.cut import FEWEST as PIECE
@@ -327,7 +327,7 @@ def wrapped(view: View) -> Iterator[Finding]:
         yield Finding(
             "error",
             "position-wrap",
-            f"position jumps {at.size} times by {size:.4g} {unit}: {_counted_within(size, unit, turn)}",
+            f"position jumps {times(at.size)} by {size:.4g} {unit}: {_counted_within(size, unit, turn)}",
             row(index, view),
             "say --unwrap to count it on, or log the position without overflow",
         )
@@ -335,7 +335,7 @@ def wrapped(view: View) -> Iterator[Finding]:
         yield Finding(
             "warning",
             "position-jump",
-            f"position jumps {at.size} times by about {size:.4g} {unit}",
+            f"position jumps {times(at.size)} by about {size:.4g} {unit}",
             row(index, view),
             f"leave these rows out, such as --leave-out {view.file_rows[index]}, or check the encoder",
         )

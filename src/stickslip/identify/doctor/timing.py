@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.finding import Finding, times
 from stickslip.identify.doctor.view import View, row
 
 GAP = 5.0
@@ -49,7 +49,7 @@ def ascending(view: View) -> Iterator[Finding]:
                 f", say which column is the time if {name!r} is not, or give --sample-time SECONDS if the rows follow"
                 " one another and only their times are wrong"
             )
-        message = f"time goes back {back.size} times; {piece}"
+        message = f"time goes back {times(back.size)}; {piece}"
         yield Finding("error", "backward-time", message, row(int(back[0]), view), remedy)
     same = known[1:][steps == 0.0]
     if same.size:

@@ -26,6 +26,12 @@ MAIN = ("position", "velocity", "motor_torque", "friction_torque", "current")
 BUILDS_UP = 0.3
 """Of a stroke, behind its reversal, in which friction may build up: pre-sliding, play, a load that is wound up. In
 three slow sines it was a tenth; behind it what a torque once a turn explained was a thousandth of what it had been."""
+MOVES, MOST_TRAVEL = 0.05, 0.95
+"""Part of the usual speed of a direction above which the axis moves in it; and the part of the travel in a direction
+below whose speed that much of it is travelled."""
+BOTH_WAYS, NEVER = 0.05, 1e-3
+"""Parts of the travel in one direction: from which on the travel in the other is motion in its own right (a test that
+creeps forward and runs back), and below which it is what a stop swings back."""
 MAX_ROWS = 200_000
 """Rows of the even grid: longer records are looked at more coarsely."""
 
@@ -66,9 +72,26 @@ class Smooth:
         return float(np.percentile(np.abs(self.velocity), 95)) if self.velocity.size else 0.0
 
     @cached_property
+    def travel(self) -> tuple[float, float]:
+        """Longest travel forward and longest travel backward, rad (m)."""
+        q = self.position
+        forward, backward = q - np.minimum.accumulate(q), np.maximum.accumulate(q) - q
+        return float(np.max(forward)), float(np.max(backward))
+
+    def usual_speed(self, sign: float) -> float:
+        """Return the speed below which `MOST_TRAVEL` of the travel in one direction is made, rad/s (m/s)."""
+        speed = np.sort(sign * self.velocity)
+        travelled = np.cumsum(np.maximum(speed, 0.0))
+        return float(speed[np.searchsorted(travelled, MOST_TRAVEL * travelled[-1])])
+
+    @cached_property
     def moving(self) -> Mask:
-        """Where the axis moves, mask: faster than a twentieth of `fast`."""
-        return np.asarray(np.abs(self.velocity) > 0.05 * self.fast)
+        """Rows in which the axis moves: faster than `MOVES` of `fast`, or of the usual speed of a slower direction."""
+        v = self.velocity
+        if min(self.travel) < BOTH_WAYS * max(self.travel):
+            return np.asarray(np.abs(v) > MOVES * self.fast)
+        forward, backward = (MOVES * min(self.fast, self.usual_speed(sign)) for sign in (1.0, -1.0))
+        return np.asarray((v > forward) | (v < -backward))
 
     @cached_property
     def standstill(self) -> float:

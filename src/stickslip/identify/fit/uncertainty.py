@@ -251,9 +251,19 @@ def verdict_on(p: Parameter, value: float, low: float, high: float, noise: Noise
         if high > RATIO * low:
             return f"the interval spans a factor of {high / low:.3g}; identified means at most {RATIO:g}"
         return ""
-    half = 0.5 * (high - low)
-    if not half <= SHARE * scale:
-        unit = p.par.unit
-        what = "friction, " if unit in ("N·m", "N") else ""
-        return f"the interval's half-width of {half:.3g} {unit} exceeds {100.0 * SHARE:g} % of {what}{scale:.3g} {unit}"
-    return ""
+    return too_wide(0.5 * (high - low), p.par.unit, scale)
+
+
+def too_wide(half: float, unit: str, scale: float) -> str:
+    """Explain why a half-width is too wide beside `scale`, the level of friction for a torque; empty if it is not.
+
+    A level that is not above 0 is no friction: it cannot measure the width of anything.
+    """
+    torque = unit in ("N·m", "N")
+    if not 0.0 < scale < math.inf:
+        level = "level of friction above 0" if torque else "size above 0"
+        return f"no {level} was found with which its half-width of {half:.3g} {unit} can be compared"
+    if half <= SHARE * scale:
+        return ""
+    what = "friction, " if torque else ""
+    return f"the interval's half-width of {half:.3g} {unit} exceeds {100.0 * SHARE:g} % of {what}{scale:.3g} {unit}"

@@ -8,6 +8,7 @@ a small one may be there all the same, and takes part as what no law holds.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -89,23 +90,34 @@ def length_of(signals: Signals) -> float:
 
 
 class Drift(NamedTuple):
-    """By what part of its value at the first row friction at the usual speed grows to the last, and half the 95 %
-    interval."""
+    """Growth of friction at the usual speed from the first row to the last, in parts of its value at the first row,
+    with its 95 % interval."""
 
     share: float
-    half: float
+    low: float
+    high: float
 
     def __str__(self) -> str:
-        way = "falls" if self.share < 0.0 else "rises"
-        return f"{way} by {100.0 * abs(self.share):.2g} % (±{100.0 * self.half:.2g})"
+        way, sizes = (
+            ("falls", (-self.high, -self.low)) if self.share < 0.0 else ("rises", (self.low, self.high))
+        )
+        least, most = (100.0 * size for size in sizes)
+        span = f"{least:.2g} to {most:.2g} %" if math.isfinite(most) else f"at least {least:.2g} %"
+        return f"{way} by {100.0 * abs(self.share):.2g} % (95 % interval {span})"
 
 
 def drift_of(numbers: Mapping[str, Number], records: Sequence[SlidingRows]) -> Drift | None:
-    """The drift of friction over a record; none where none is told."""
+    """Return the drift of friction over a record; None if its interval contains 0."""
     if "drift" not in numbers:
         return None
     drift, middle = numbers["drift"], numbers["fc"].value + usual_speed(records) * numbers["sigma2"].value
-    first = middle - 0.5 * drift.value
-    if first <= 0.0 or abs(drift.value) < QUANTILE * drift.std:
-        return None
-    return Drift(drift.value / first, QUANTILE * drift.std * abs(middle) / first**2)
+
+    def share(grown: float) -> float:
+        """Growth in parts of the value at the first row, which it lowers itself."""
+        first = middle - 0.5 * grown
+        return grown / first if first > 0.0 else math.inf
+
+    half = QUANTILE * drift.std
+    found = Drift(share(drift.value), share(drift.value - half), share(drift.value + half))
+    known = math.isfinite(found.share) and middle > 0.0
+    return found if known and (found.low > 0.0 or found.high < 0.0) else None

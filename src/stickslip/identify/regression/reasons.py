@@ -15,6 +15,11 @@ APART = (
     f"{NOT_AS_ONE}, or slides too briefly: what its acceleration needs is unsure to {{share:.2g}} of Fc; record longer "
     "and gentler motion"
 )
+COGGING = "the torque over the position (cogging, unbalance) is"
+COGGED = (
+    f"{COGGING} {{ratio:.2g}} times the level of friction, so the torque that the acceleration needs is uncertain to "
+    "{share:.2g} of Fc; record slow turns at constant speed in both directions"
+)
 DROWNED = (
     "friction is too small beside the torque that accelerates, which is unsure to {share:.2g} of Fc; record longer and "
     "gentler motion"
@@ -28,7 +33,7 @@ DRIVES = (
     "or something else moves it (cogging at one speed); record moves at several speeds, all columns by one clock"
 )
 UNMOVED = (
-    "the torque shows neither the pendulum's inertia nor its weight, which move it all the same: it is what a "
-    "controller makes of the velocity (bang-bang, energy shaping), not what friction needs; record moves under "
-    "position control"
+    "the torque shows neither the inertia nor the weight of the pendulum, so the column is not the torque that moves "
+    "the axis: the drive or robot may have subtracted gravity and inertia, or it is a command that follows the "
+    "direction of motion alone; map the motor's own torque or current, or leave out --pendulum if no weight acts"
 )

@@ -26,7 +26,7 @@ from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.bands import USUALLY, WEIGHT, decided, in_bands, rough
 from stickslip.identify.regression.creeping import NOWHERE, Creep
 from stickslip.identify.regression.drifted import calm_beside_drift
-from stickslip.identify.regression.drifting import DRIFTS, drift_torque
+from stickslip.identify.regression.drifting import DRIFTS, drift_torque, usual_speed
 from stickslip.identify.regression.falls import Falling, fall_of
 from stickslip.identify.regression.flexible import train_torque, two_inertias
 from stickslip.identify.regression.number import QUANTILE, Number
@@ -35,6 +35,7 @@ from stickslip.identify.regression.reasons import (
     APART,
     AT_ONE_SPEED,
     BEYOND_LEVEL,
+    COGGED,
     DRIVES,
     LEVEL_UNTOLD,
     STILL_ROUGH,
@@ -223,11 +224,17 @@ class Regression:
 
     @property
     def friction(self) -> float:
-        """What a constant torque is small or large beside, N·m (N): Fc; friction at the median speed of certain sliding
-        where Fc is not told to a factor of two."""
-        level, slope = abs(self.numbers["fc"].value), max(self.numbers["sigma2"].value, 0.0)
-        usual = float(np.median(stacked(self.rows, "speed")))
-        return level if self.numbers["fc"].told_to_two else level + slope * usual
+        """Level of friction that other torques are compared with, N·m (N): Fc, or friction at the usual speed where Fc
+        is not known to a factor of two; 0 where that comes out below 0."""
+        level, slope = self.numbers["fc"], max(self.numbers["sigma2"].value, 0.0)
+        if level.told_to_two:
+            return level.value
+        return max(level.value + slope * usual_speed(self.rows), 0.0)
+
+    @property
+    def waves(self) -> float:
+        """RMS of the torque over the position that was found, N·m (N)."""
+        return float(np.sqrt(0.5 * np.sum(self.harmonics**2)))
 
     @property
     def unsure_share(self) -> float:
@@ -240,6 +247,8 @@ class Regression:
         """Why its numbers are not to be believed; empty where they are."""
         level = abs(self.numbers["fc"].value)
         if self.unsure_share > UNSURE:
+            if self.waves > self.unexplained_by(self.own):
+                return COGGED.format(ratio=self.waves / max(level, 1e-300), share=self.unsure_share)
             return APART.format(share=self.unsure_share)
         if self.unexplained_by(self.own) > BEYOND * level:
             return BEYOND_LEVEL

@@ -299,8 +299,10 @@ def seen_through(signals: Signals, window: Window) -> SlidingRows:
     places = np.flatnonzero(clear[::stride]) * stride
     if places.size < FEWEST:
         raise InputError(
-            f"{places.size * stride * period:.3g} s of gross sliding are too little; record longer motion in one "
-            "direction, or a finer position"
+            f"too little gross sliding: it lasts {longest_run(~doubtful) * period:.3g} s at a time at most, of which "
+            f"{places.size * stride * period:.3g} s in all are far enough from reversals and stops for a window of "
+            f"{2 * window.reach * period:.3g} s; record longer motion in one direction, a finer position, or rows "
+            "more often"
         )
     stopped = np.maximum.accumulate(np.where(doubtful, np.arange(q.size), 0))
     sign = direction[places]
@@ -311,6 +313,12 @@ def seen_through(signals: Signals, window: Window) -> SlidingRows:
         np.column_stack([a[places], v[places], sign, np.ones(places.size)]), jerk[places], snap[places],
         np.zeros((places.size, 0)), stroke, signals, window, places, np.abs(q[places] - q[stopped[places]]), quick,
     )  # fmt: skip
+
+
+def longest_run(marked: np.ndarray[Any, np.dtype[np.bool_]]) -> int:
+    """Return the length of the longest run of marked rows."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8)))
+    return int(np.max(np.diff(ends)[::2], initial=0))
 
 
 def fine_window(window: Window) -> Window:

@@ -10,7 +10,7 @@ import numpy as np
 
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.fit.student import student_quantile
-from stickslip.identify.fit.uncertainty import SHARE
+from stickslip.identify.fit.uncertainty import too_wide
 from stickslip.identify.sliding.points import SlidingPoints
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -38,10 +38,7 @@ def constant_torque(points: SlidingPoints) -> Estimate | None:
     if abs(value) <= half:
         return None
     scale, unit = float(np.median(np.abs(points.torque))), points.unit[1]
-    verdict = ""
-    if half > SHARE * scale:
-        limit = f"{100.0 * SHARE:g} % of friction, {scale:.3g} {unit}"
-        verdict = f"the interval's half-width of {half:.3g} {unit} exceeds {limit}"
+    verdict = too_wide(half, unit, scale)
     return Estimate("offset", unit, "T_0", value, std, value - half, value + half, not verdict, verdict)
 
 
