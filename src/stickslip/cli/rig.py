@@ -80,7 +80,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         action.add_argument(
             "--limit", action="append", default=[], metavar="NAME=VALUE",
             help="tighter limit than the rig's: torque, speed, lowest_position, highest_position, temperature, "
-            "following_error, stop_time (SI units)",
+            "following_error, stop_time, answer_time, standstill_torque (SI units)",
         )  # fmt: skip
         action.add_argument("--dry-run", action="store_true", help="print the plan without moving")
         action.add_argument(
