@@ -148,6 +148,8 @@ def crossed(rig: str, limits: Limits, reason: int, value: float, at: float) -> R
     """The error for what the guarded sample itself saw: the limit, the `value` that crossed it, and when."""
     where = f"at t = {at:.3f} s; the torque was ramped to zero"
     name = REASONS[reason]
+    if reason == CLOCK:
+        return clock_fault(rig, value, f"in one sample {where}")
     if (found := contradiction(limits, reason, value)) is not None:
         what, remedy = found
         return MeasurementFault(f"{rig}: {what} {where}; {remedy}")
@@ -161,16 +163,19 @@ def crossed(rig: str, limits: Limits, reason: int, value: float, at: float) -> R
     return LimitCrossed(f"position or torque is {value:g}, {name}, {where}")
 
 
+def clock_fault(rig: str, step: float, where: str) -> MeasurementFault:
+    """The error for a clock that does not advance as the samples do."""
+    return MeasurementFault(
+        f"{rig}: its time changes by {step:.6g} s {where}; it must increase by the sample time in every sample; correct "
+        "the rig's clock"
+    )
+
+
 def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] | None:
     """What about a rig's answer is not as expected (`stickslip.rigs.safety`), and what to do; None for other reasons."""
     waited = f"for {limits.answer_time:g} s (limit answer_time)"
     wiring = "check the current loop, the sign and the torque constant; a rig that measures no torque returns NaN"
     match reason:
-        case _ if reason == CLOCK:
-            return (
-                f"its time advances by {value:.6g} s in one sample",
-                "it must increase by the sample time in every sample; correct the rig's clock",
-            )
         case _ if reason == STILL:
             return (
                 f"the position has not changed {waited} under {value:.4g} N·m, which must move the axis",

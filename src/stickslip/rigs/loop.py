@@ -27,7 +27,7 @@ from stickslip.errors import InputError, MessageLost, Overrun, RigError
 from stickslip.record import Record
 from stickslip.rigs.budget import BUDGET, Budget, Watch
 from stickslip.rigs.declared import FIELDS, answer, blamed, checked, last_resort
-from stickslip.rigs.guard import Guard
+from stickslip.rigs.guard import Guard, clock_fault
 from stickslip.rigs.interrupts import Signals
 from stickslip.rigs.loop_sample import COLUMNS, UNITS, Control, control_of
 from stickslip.rigs.realtime import TIMES, Account, Pace, soft_real_time
@@ -41,7 +41,7 @@ Result = TypeVar("Result")
 PythonController = Callable[[Measurement, Setpoint], float]
 """A controller in Python: the torque from what is measured and the setpoint, N·m. It runs sample by sample."""
 
-TORQUE = Setpoint._fields.index("torque")
+TORQUE, TIME = Setpoint._fields.index("torque"), Measurement._fields.index("time")
 CLOSING, ABANDONED = 10.0, 1.0
 """s that a rig may take to close: at the end, and from another thread while its exchange does not return"""
 BLOCK = 50
@@ -287,7 +287,14 @@ class Loop:
         if self.rig.capabilities.real_clock:
             self._rest(seconds)
         else:
-            self._guard.control.measured[:] = answer(self.rig, "pause", lambda: self.rig.pause(seconds))
+            measured = self._guard.control.measured
+            before = float(measured[TIME])
+            measured[:] = answer(self.rig, "pause", lambda: self.rig.pause(seconds))
+            if not measured[TIME] >= before:
+                measured[TIME], after = before, float(measured[TIME])
+                self._guard.ask(clock_fault(self.rig.name, after - before, "during a pause"))
+                self._guard.cut()
+                raise self._error(self._open_stream())
             self._guard.forget_speed()
         return Measurement(*self._guard.control.measured)
 

@@ -89,7 +89,7 @@ class Safety(NamedTuple):
     velocity: Annotated[float, Par("rad/s", "", "difference of the positions over the sample time")]
     origin: Annotated[float, Par("rad", "", "position at the start of the segment")]
     value: Annotated[float, Par("-", "", "the value that crossed its limit")]
-    time: Annotated[float, Par("s", "", "the rig's time one sample ago")]
+    time: Annotated[float, Par("s", "", "the rig's time one sample ago, as it is recorded")]
     begun: Annotated[float, Par("-", "", "samples of the segment; others may have passed before its second answer")]
     astray: Annotated[float, Par("s", "", "for how long the clock has run at another rate")]
     driven: Annotated[float, Par("-", "", "samples in a row in which the motor drove a sliding axis")]
@@ -254,14 +254,9 @@ def watch_torque(y: Any, b: Any, s: Any) -> None:
 
 def watch_answer(y: Any, b: Any, s: Any) -> None:
     """What is expected of the rig's answer to the last command."""
-    if not abs(y.position) < UNBOUNDED:
-        return
-    if s.started != 0.0 and b.answer < UNBOUNDED:
-        watch_clock(y, b, s)
-        watch_standstill(y, b, s)
-        watch_readings(y, b, s)
-        watch_torque(y, b, s)
-    else:
+    known = abs(y.position) < UNBOUNDED
+    watched = b.answer < UNBOUNDED
+    if s.started == 0.0:
         s.moving = b.standstill
         s.driven = 0.0
         s.push = 0.0
@@ -270,12 +265,19 @@ def watch_answer(y: Any, b: Any, s: Any) -> None:
         s.astray = 0.0
         s.least = s.torque
         s.most = s.torque
+    elif watched and known:
+        watch_clock(y, b, s)
+        watch_standstill(y, b, s)
+        watch_readings(y, b, s)
+        watch_torque(y, b, s)
+    # The times of a record increase, also after a clock that does not has become a reason to stop.
+    s.time = s.time + b.sample_time if watched and s.started != 0.0 and not y.time > s.time else y.time
     s.started = 1.0
-    s.time = y.time
-    s.position = y.position
     s.motor = y.torque
     s.sensor = y.sensor
     s.warmth = y.temperature
+    if known:
+        s.position = y.position
 
 
 def idle(y: Any, w: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
