@@ -26,13 +26,13 @@ class Disturbed(Ds402):
 
     def __init__(self, settings, frames) -> None:
         super().__init__(settings)
-        self._frames, self._count = frames, 0
+        self._frames, self.calls = frames, 0
         self.torques: list[float] = []
 
     def exchange(self, torque: float) -> Measurement:
-        self._count += 1
+        self.calls += 1
         self.torques.append(torque)
-        if self._count == 60:
+        if self.calls == 60:
             with can.Bus(**self.settings.bus) as other:
                 for number, data, extended in self._frames:
                     other.send(can.Message(arbitration_id=number, data=data, is_extended_id=extended))

@@ -127,8 +127,8 @@ def test_an_axis_that_sticks_and_slips_is_no_fault(counts):
     with Loop(rig) as loop:
         loop.run(setpoints(6000, torque=0.25 * np.sign(np.sin(9.0 * t))))
         loop.run(setpoints(6000, torque=0.21 * (np.mod(t, 0.2) < 0.15)))
-        loop.pause(1.0)
         rig.position = 0.0
+        loop.pause(1.0)
         loop.run(sine(6000), PD)
         loop.run(setpoints(6000, position=0.02 * t, velocity=0.02, closed=1.0), PD)
         loop.run(setpoints(6000, position=0.12 + 0.05 * np.sin(20.0 * t), closed=1.0), PD)

@@ -23,6 +23,7 @@ import contextlib
 import math
 import struct
 import time
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -111,6 +112,8 @@ class Ds402:
         self._found = ""
         self._status = 0
         self._asked = self._told = 0.0
+        self._sent: Counter[tuple[int, bytes]] = Counter()
+        self._echo: bool | None = None
 
     # ---- the rig ---------------------------------------------------------------------------------------------
 
@@ -131,7 +134,9 @@ class Ds402:
         network.send_message(0, bytes([0x80, self.settings.node]))  # pre-operational
         assert network.notifier is not None
         network.notifier.stop(1.0)  # from now on this thread reads the bus
-        network.send_message(0, bytes([0x01, self.settings.node]))  # operational
+        self._sent.clear()
+        self._echo = None
+        self._post(0, bytes([0x01, self.settings.node]))  # operational
         self._begin = time.monotonic_ns()
         self._found, self._status, self._node.error = "", 0, 0
         self._asked = self._told = time.monotonic()
@@ -306,8 +311,8 @@ class Ds402:
     def _send(self, word: int, torque: float) -> None:
         network = self._node.network
         per_mille = max(-32768, min(32767, round(1e3 * torque / self._rated)))
-        network.send_message(0x200 + self.settings.node, COMMAND.pack(word, per_mille))
-        network.send_message(0x80, b"")
+        self._post(0x200 + self.settings.node, COMMAND.pack(word, per_mille))
+        self._post(0x80, b"")
         if (now := time.monotonic()) - self._asked > MODE_PERIOD:
             self._asked = now
             network.send_message(0x600 + self.settings.node, cia.MODE_QUESTION)
@@ -317,6 +322,22 @@ class Ds402:
             if self._beats % self._beat_every == 0:
                 network.send_message(0x700 + OWN_NODE, b"\x05")
             self._beats += 1
+
+    def _post(self, service: int, data: bytes) -> None:
+        """Send what nobody else may send, and know it again on a bus that hands back what is sent."""
+        self._node.network.send_message(service, data)
+        if self._echo is not False:
+            self._sent[service, data] += 1
+
+    def _is_echo(self, service: int, data: bytes) -> bool:
+        """Whether a frame is one of this process, which some buses hand back."""
+        if not self._sent.get((service, data)):
+            return False
+        self._echo = True
+        self._sent[service, data] -= 1
+        if not self._sent[service, data]:
+            del self._sent[service, data]
+        return True
 
     def _cycle(self, word: int, torque: float) -> tuple[int, Measurement]:
         """One sample: statusword and measurement."""
@@ -367,9 +388,14 @@ class Ds402:
             return None
         if message.is_extended_id or message.is_remote_frame or not message.is_rx:
             return None
+        if self._is_echo(message.arbitration_id, bytes(message.data)):
+            return None
         service, data, node = message.arbitration_id, bytes(message.data), self.settings.node
         if service == 0x180 + node:
             if len(data) == ANSWER.size:
+                if self._echo is None:  # an echo of the SYNC that it answers would have been first
+                    self._echo = False
+                    self._sent.clear()
                 return data
             found = f"its TPDO has {len(data)} bytes in place of {ANSWER.size}: another master has mapped it anew"
         elif service == 0x80 + node and len(data) >= 2:
