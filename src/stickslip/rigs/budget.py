@@ -79,6 +79,7 @@ class Budget:
                 late = self._behind + took - self._allowed
                 self._behind = max(0.0, late)
         if late > self.budget:
+            self._behind = 0.0  # the calls of the ramp have their own
             raise self._complaint(took)
         return found
 
