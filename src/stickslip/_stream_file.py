@@ -6,6 +6,7 @@ import json
 import os
 import struct
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,8 @@ class StreamFile:
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"{path} cannot be created ({reason}); give another name") from None
+        found = os.fstat(self._file)
+        self._identity = found.st_dev, found.st_ino
         try:
             allocate(self._file, 0, self._start)
             whole_write(self._file, self._head() + header, 0)
@@ -139,9 +142,12 @@ class StreamFile:
             self._file = -1
 
     def discard(self) -> None:
-        """Close and remove it: it holds nothing."""
+        """Close and remove it, unless another file has its name by now: it holds nothing."""
         self.close()
-        self.path.unlink(missing_ok=True)
+        with suppress(OSError):
+            found = os.stat(self.path)
+            if (found.st_dev, found.st_ino) == self._identity:
+                self.path.unlink()
 
     def _head(self) -> bytes:
         return HEAD.pack(MAGIC, self._start, self._count, len(self._header), 0)
@@ -207,8 +213,8 @@ def load(path: str | os.PathLike[str]) -> Contents:
     if back.size:
         at = int(back[0])
         raise InputError(
-            f"{path}: time goes from {rows[at, 0]:.9g} to {rows[at + 1, 0]:.9g} s after row {at + 1} of {len(rows)}, and "
-            "must increase; record the run again with a rig whose clock advances in every sample"
+            f"{path}: time goes from {rows[at, 0]:.9g} to {rows[at + 1, 0]:.9g} s after row {at + 1} of {len(rows)}, "
+            "and must increase; record the run again with a rig whose clock advances in every sample"
         )
     return contents(units, absent, rows, meta)
 

@@ -332,7 +332,9 @@ def test_a_damaged_record_is_named(tmp_path):
         lambda: claimed(tmp_path, rig, anew=False, own=listed),
         lambda: course.run(short, name="track-100-mean"),
     ):
-        with pytest.raises(InputError, match=r"track-100-mean\.npz is not a record .*; move it away, so that"):
+        with pytest.raises(
+            InputError, match=r"track-100-mean\.npz is not a record .*; move it away, so that"
+        ):
             again()
     assert file.read_bytes() == content
 

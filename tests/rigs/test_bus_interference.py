@@ -8,7 +8,7 @@ import pytest
 
 can = pytest.importorskip("can")
 
-from test_ds402 import LIMITS, NODE, drive  # noqa: E402, F401
+from test_ds402 import NODE, drive  # noqa: E402, F401
 
 from stickslip.errors import DriveFault, InputError, RigError  # noqa: E402
 from stickslip.record import Record  # noqa: E402
@@ -84,7 +84,12 @@ def test_frames_of_29_bits_are_not_the_drives(drive):  # noqa: F811
 
 def test_frames_of_others_are_left_alone(drive):  # noqa: F811
     """Another node's PDO, emergency, boot-up and the NMT start of all."""
-    frames = [(0x180 + 9, bytes(8), False), (0x80 + 9, bytes(8), False), (0x700 + 9, b"\0", False), (0, b"\1\0", False)]
+    frames = [
+        (0x180 + 9, bytes(8), False),
+        (0x80 + 9, bytes(8), False),
+        (0x700 + 9, b"\0", False),
+        (0, b"\1\0", False),
+    ]
     with Loop(Disturbed(drive.settings(), frames)) as loop:
         assert len(loop.run(setpoints(200, torque=0.1))) == 200
 
@@ -100,14 +105,15 @@ def test_a_drive_that_refuses_its_configuration(drive):  # noqa: F811
         pass
 
 
+def both(first: Ds402, second: Ds402) -> None:
+    with Loop(first) as loop:
+        loop.run(setpoints(50, torque=0.1))
+        with Loop(second):
+            loop.run(setpoints(50, torque=0.1))
+
+
 def test_two_rigs_cannot_share_a_bus(drive):  # noqa: F811
     """The second one's SYNC makes the first drive act and measure between its samples."""
-    first = Ds402(drive.settings())
-    with pytest.raises(RigError, match=r"SYNC|commands this drive|NMT command"), Loop(first) as loop:
-        loop.run(setpoints(50, torque=0.1))
-        other = Ds402(drive.settings())
-        try:
-            other.open()
-        finally:
-            loop.run(setpoints(50, torque=0.1))
-    assert LIMITS.torque == 1.0
+    with pytest.raises(RigError, match=r"SYNC|commands this drive|NMT command"):
+        both(Ds402(drive.settings()), Ds402(drive.settings()))
+    assert drive.changes(0)[-1][1] == 0.0

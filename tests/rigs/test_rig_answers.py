@@ -25,7 +25,9 @@ AT = 200
 def sine(count: int, amplitude: float = 0.5):
     t = 1e-3 * np.arange(count)
     w = 2.0 * np.pi
-    return setpoints(count, position=amplitude * np.sin(w * t), velocity=amplitude * w * np.cos(w * t), closed=1.0)
+    return setpoints(
+        count, position=amplitude * np.sin(w * t), velocity=amplitude * w * np.cos(w * t), closed=1.0
+    )
 
 
 def frozen(keep: tuple[str, ...]):
@@ -91,7 +93,12 @@ def test_a_fault_while_a_constant_torque_drives_it(name, tmp_path):
     """0.25 N·m against 0.2 N·m of friction; the readings say that the axis stopped dead."""
     change, _ = FAULTS[name]
     rig = CoulombRig(change)
-    ended(rig, "has not changed|its time", tmp_path / "run.stream", lambda loop: loop.run(setpoints(5000, torque=0.25)))
+    ended(
+        rig,
+        "has not changed|its time",
+        tmp_path / "run.stream",
+        lambda loop: loop.run(setpoints(5000, torque=0.25)),
+    )
     assert len(rig.torques) < AT + 150
 
 
@@ -101,7 +108,9 @@ def test_a_torque_command_that_is_ignored(tmp_path):
     ended(rig, "does not follow", tmp_path / "a.stream", lambda loop: loop.run(setpoints(5000, torque=0.19)))
     assert len(rig.torques) < 300
     blocked = CoulombRig(friction=2.0)
-    ended(blocked, "has not changed", tmp_path / "b.stream", lambda loop: loop.run(setpoints(5000, torque=0.85)))
+    ended(
+        blocked, "has not changed", tmp_path / "b.stream", lambda loop: loop.run(setpoints(5000, torque=0.85))
+    )
 
 
 @pytest.mark.parametrize("counts", [200.0, 4000.0, 1e6])
@@ -152,14 +161,14 @@ def test_a_rig_without_a_measured_torque():
 
 
 def test_limits_of_the_answers_are_set_in_the_file(tmp_path):
-    (tmp_path / "rig.toml").write_text(
-        '[rig]\nkind = "virtual"\nmachine = "ideal"\n'
-    )
+    (tmp_path / "rig.toml").write_text('[rig]\nkind = "virtual"\nmachine = "ideal"\n')
     assert read_rig(tmp_path / "rig.toml").limits.answer_time == 0.1
     assert LIMITS.standstill_torque == pytest.approx(0.8)
     # A lower torque limit lowers no break-away torque.
     assert replace(LIMITS, torque=0.3).standstill_torque == pytest.approx(0.8)
-    early = CoulombRig(frozen(("time", "torque")), limits=replace(LIMITS, standstill_torque=0.3, answer_time=0.02))
+    early = CoulombRig(
+        frozen(("time", "torque")), limits=replace(LIMITS, standstill_torque=0.3, answer_time=0.02)
+    )
     with pytest.raises(MeasurementFault, match=r"for 0.02 s .*answer_time"), Loop(early) as loop:
         loop.run(sine(5000), PD)
     with pytest.raises(InputError, match="answer_time = 1 is wider"):
@@ -175,10 +184,13 @@ def test_a_clock_that_goes_back_in_a_pause():
             self.time -= 1.0
             return self.measured()
 
-    rig = Back()
-    with pytest.raises(MeasurementFault, match="during a pause"), Loop(rig) as loop:
+    def work(loop: Loop) -> None:
         loop.run(setpoints(2000, torque=0.1))
         loop.pause(1.0)
+
+    rig = Back()
+    with pytest.raises(MeasurementFault, match="during a pause"), Loop(rig) as loop:
+        work(loop)
     assert rig.torques[-1] == 0.0
 
 
@@ -195,9 +207,13 @@ def test_what_goes_wrong_while_the_torque_is_taken_away_is_reported(tmp_path):
         return measured
 
     rig = CoulombRig(refuse)
-    with pytest.raises(RigError, match=r"cable.* has not answered .* watchdog .* within 0.05 s \(its own timer\)"):
-        with Loop(rig) as loop:
-            loop.run(setpoints(100, torque=0.5))
+    with (
+        pytest.raises(
+            RigError, match=r"cable.* has not answered .* watchdog .* within 0.05 s \(its own timer\)"
+        ),
+        Loop(rig) as loop,
+    ):
+        loop.run(setpoints(100, torque=0.5))
     assert rig.closed
 
 

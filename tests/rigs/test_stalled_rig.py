@@ -50,7 +50,9 @@ def run(rig: CoulombRig, path) -> None:
 @pytest.mark.parametrize("seconds", [3.0, 3600.0])
 def test_the_torque_is_gone_while_exchange_stalls(seconds, tmp_path):
     rig, begin = Stalled(seconds), time.monotonic()
-    with pytest.raises(MessageLost, match=r"exchange took .* at a command of 0.19 N·m.* closed meanwhile.*watchdog"):
+    with pytest.raises(
+        MessageLost, match=r"exchange took .* at a command of 0.19 N·m.* closed meanwhile.*watchdog"
+    ):
         run(rig, tmp_path / "run.stream")
     assert rig.zero_after < 1.0
     assert time.monotonic() - begin < 20.0

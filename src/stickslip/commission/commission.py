@@ -149,8 +149,8 @@ class _Course:
         before, ended = self.last
         self.last = None
         self.notes.append(
-            f"This commissioning was resumed: {name} starts at {angle:.4g} rad, after {before} had ended at {ended:.4g} "
-            "rad; in an uninterrupted one it starts there, with the temperature of that time, and its record differs."
+            f"Resumed: {name} starts at {angle:.4g} rad, while {before} had ended at {ended:.4g}"
+            " rad. The records from here on differ from those of an uninterrupted run in angle and temperature."
         )
         self.progress(self.notes[-1])
 

@@ -72,8 +72,8 @@ def loaded(path: Path) -> Record:
         record = Record.load(path)
     except InputError as error:
         raise InputError(
-            f"{str(error).rstrip('.')}; move it away, so that this stage is measured again, or give another folder with "
-            "--out"
+            f"{str(error).rstrip('.')}; move it away, so that this stage is measured again, or give another folder "
+            "with --out"
         ) from None
     if "settings" not in record.meta:
         raise InputError(

@@ -8,9 +8,9 @@ The drive guards itself (CiA 301 and 402): it watches the RPDO (its event timer,
 process (1016h), and on their absence does what 6007h says, here "disable voltage". Both are sent by the loop itself,
 so that a loop that hangs is missed as one that was killed is.
 
-Another master must not interfere. Its SYNC, its commands (RPDO, NMT) and a restart of the drive are heard on the bus; the
-mode of operation, which no PDO has room for, is asked for by SDO every `MODE_PERIOD`. Each ends the run, as an emergency
-does. Frames with identifiers of 29 bits belong to other protocols.
+Another master must not interfere. Its SYNC, its commands (RPDO, NMT) and a restart of the drive are heard on the bus;
+the mode of operation, which no PDO has room for, is asked for by SDO every `MODE_PERIOD`. Each ends the run, as an
+emergency does. Frames with identifiers of 29 bits belong to other protocols.
 
 Configuration uses `canopen`; during the run the bus is read in the loop's own thread, since handing frames from
 thread to thread costs more than a sample has. `pip install 'stickslip[canopen]'` brings canopen (MIT) and
@@ -397,7 +397,9 @@ class Ds402:
                     self._echo = False
                     self._sent.clear()
                 return data
-            found = f"its TPDO has {len(data)} bytes in place of {ANSWER.size}: another master has mapped it anew"
+            found = (
+                f"its TPDO has {len(data)} bytes in place of {ANSWER.size}: another master has mapped it anew"
+            )
         elif service == 0x80 + node and len(data) >= 2:
             self._node.on_emergency(0, bytearray(data), 0.0)
             return None

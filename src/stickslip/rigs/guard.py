@@ -9,7 +9,20 @@ from stickslip.errors import DriveFault, InputError, Interrupted, LimitCrossed, 
 from stickslip.rigs.loop_sample import BOUNDS, MEASURED, REMEMBERED, SAFETY, Control
 from stickslip.rigs.rig import LIMIT_UNITS, Limits
 from stickslip.rigs.safety import (
-    ASKED, CLOCK, FROZEN, IGNORED, NONE, OPPOSED, REASONS, RUNNING, STATUS, STILL, STOPPED, STOPPING, UNBOUNDED, Safety,
+    ASKED,
+    CLOCK,
+    FROZEN,
+    IGNORED,
+    NONE,
+    OPPOSED,
+    REASONS,
+    RUNNING,
+    STATUS,
+    STILL,
+    STOPPED,
+    STOPPING,
+    UNBOUNDED,
+    Safety,
 )  # fmt: skip
 from stickslip.stream import Stream
 
@@ -166,15 +179,17 @@ def crossed(rig: str, limits: Limits, reason: int, value: float, at: float) -> R
 def clock_fault(rig: str, step: float, where: str) -> MeasurementFault:
     """The error for a clock that does not advance as the samples do."""
     return MeasurementFault(
-        f"{rig}: its time changes by {step:.6g} s {where}; it must increase by the sample time in every sample; correct "
-        "the rig's clock"
+        f"{rig}: its time changes by {step:.6g} s {where}; it must increase by the sample time in every sample; "
+        "correct the rig's clock"
     )
 
 
 def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] | None:
-    """What about a rig's answer is not as expected (`stickslip.rigs.safety`), and what to do; None for other reasons."""
+    """What is not as expected of a rig's answer (`stickslip.rigs.safety`), and the remedy; None for other reasons."""
     waited = f"for {limits.answer_time:g} s (limit answer_time)"
-    wiring = "check the current loop, the sign and the torque constant; a rig that measures no torque returns NaN"
+    wiring = (
+        "check the current loop, the sign and the torque constant; a rig that measures no torque returns NaN"
+    )
     match reason:
         case _ if reason == STILL:
             return (
@@ -188,7 +203,10 @@ def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] 
                 "check the connection: the rig repeats an old measurement",
             )
         case _ if reason == IGNORED:
-            return f"the measured torque, {value:.4g} N·m on average, does not follow the command {waited}", wiring
+            return (
+                f"the measured torque, {value:.4g} N·m on average, does not follow the command {waited}",
+                wiring,
+            )
         case _ if reason == OPPOSED:
             return (
                 f"the torque sensor reads {value:.4g} N·m against the torque with which the motor drives the axis",

@@ -176,8 +176,8 @@ class Loop:
 
     def _unanswered(self, took: float) -> RigError:
         return MessageLost(
-            f"{self.rig.name}: exchange took {1e3 * took:.3g} ms in a sample of {1e3 * self.rig.sample_time:.3g} ms, at "
-            f"a command of {self._guard.torque:.4g} N·m, and is more than its answer_time of "
+            f"{self.rig.name}: exchange took {1e3 * took:.3g} ms in a sample of {1e3 * self.rig.sample_time:.3g} ms, "
+            f"at a command of {self._guard.torque:.4g} N·m, and is more than its answer_time of "
             f"{1e3 * self.limits.answer_time:.3g} ms behind the clock; check the connection, or set a greater "
             "answer_time in [rig.limits]"
         )

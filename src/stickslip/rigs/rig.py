@@ -281,7 +281,8 @@ class Rig(Protocol):
         ...
 
     def close(self) -> None:
-        """Disarm and disconnect; it may be called at any time, also twice, and after a failed `open`."""
+        """Take the torque away, disarm and disconnect. It may be called at any time: twice, after a failed `open`, and
+        from another thread while `exchange` does not return."""
         ...
 
 

@@ -90,7 +90,9 @@ class Safety(NamedTuple):
     origin: Annotated[float, Par("rad", "", "position at the start of the segment")]
     value: Annotated[float, Par("-", "", "the value that crossed its limit")]
     time: Annotated[float, Par("s", "", "the rig's time one sample ago, as it is recorded")]
-    begun: Annotated[float, Par("-", "", "samples of the segment; others may have passed before its second answer")]
+    begun: Annotated[
+        float, Par("-", "", "samples of the segment; others may have passed before its second answer")
+    ]
     astray: Annotated[float, Par("s", "", "for how long the clock has run at another rate")]
     driven: Annotated[float, Par("-", "", "samples in a row in which the motor drove a sliding axis")]
     push: Annotated[float, Par("N·m", "", "largest torque of these samples")]
@@ -237,7 +239,10 @@ def watch_torque(y: Any, b: Any, s: Any) -> None:
     if abs(y.torque) < UNBOUNDED:
         s.answered += part * (y.torque - s.answered)
         command = abs(s.commanded)
-        if command > CHANGED * b.torque and abs(s.answered - s.commanded) > UNLIKE * command + OFFSET * b.torque:
+        if (
+            command > CHANGED * b.torque
+            and abs(s.answered - s.commanded) > UNLIKE * command + OFFSET * b.torque
+        ):
             s.unlike += b.sample_time
         else:
             s.unlike = 0.0
