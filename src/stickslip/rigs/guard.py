@@ -145,6 +145,8 @@ class Guard:
     def error(self, rig: str, limits: Limits, stream: Stream) -> BaseException:
         """What is raised once the torque is zero."""
         s, at = self._safety, float(self._measured["time"])
+        if not math.isfinite(at):
+            at = float(s["time"])
         if self.fault is None:
             self.fault = crossed(rig, limits, int(s["reason"]), float(s["value"]), at)
         fault = self.fault = told(self.fault)
