@@ -194,6 +194,25 @@ def test_a_clock_that_goes_back_in_a_pause():
     assert rig.torques[-1] == 0.0
 
 
+def test_a_pause_that_fails_is_in_the_record(tmp_path):
+    class Deaf(CoulombRig):
+        def pause(self, seconds: float) -> Measurement:
+            raise OSError("cable")
+
+    def work(loop: Loop) -> None:
+        loop.run(setpoints(50, torque=0.1))
+        loop.pause(1.0)
+
+    rig = Deaf()
+    with (
+        pytest.raises(RigError, match="pause raised OSError: cable"),
+        Loop(rig, path=tmp_path / "a.stream") as loop,
+    ):
+        work(loop)
+    assert "cable" in Record.load(tmp_path / "a.stream").meta["ended"]
+    assert rig.torques[-1] == 0.0
+
+
 def test_what_goes_wrong_while_the_torque_is_taken_away_is_reported(tmp_path):
     """Nothing is wrong until the loop is left."""
     rig = CoulombRig(lambda y, k: y._replace(status=5.0) if k == 105 else y)

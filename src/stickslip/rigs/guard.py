@@ -5,7 +5,15 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 
-from stickslip.errors import DriveFault, InputError, Interrupted, LimitCrossed, MeasurementFault, RigError
+from stickslip.errors import (
+    DriveFault,
+    InputError,
+    Interrupted,
+    LimitCrossed,
+    MeasurementFault,
+    RigError,
+    StickslipError,
+)
 from stickslip.rigs.loop_sample import BOUNDS, MEASURED, REMEMBERED, SAFETY, Control
 from stickslip.rigs.rig import LIMIT_UNITS, Limits
 from stickslip.rigs.safety import (
@@ -140,7 +148,10 @@ class Guard:
     @property
     def ending(self) -> str:
         """How the run ended, for its record."""
-        return "as planned" if self.fault is None else str(self.fault)
+        if self.fault is None:
+            return "as planned"
+        known = isinstance(self.fault, StickslipError)
+        return str(self.fault) if known else f"{type(self.fault).__name__}: {self.fault}"
 
     def error(self, rig: str, limits: Limits, stream: Stream) -> BaseException:
         """What is raised once the torque is zero."""

@@ -136,8 +136,9 @@ class Loop:
             self._undo = undo.pop_all()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
         with self._undo:
+            self._guard.at_last(error)
             try:
                 self._ramp_down()
             except (RigError, InputError):
@@ -289,7 +290,8 @@ class Loop:
         else:
             measured = self._guard.control.measured
             before = float(measured[TIME])
-            measured[:] = answer(self.rig, "pause", lambda: self.rig.pause(seconds))
+            with self._signals.at_once():
+                measured[:] = answer(self.rig, "pause", lambda: self.rig.pause(seconds))
             if not measured[TIME] >= before:
                 measured[TIME], after = before, float(measured[TIME])
                 self._guard.ask(clock_fault(self.rig.name, after - before, "during a pause"))

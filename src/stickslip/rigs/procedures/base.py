@@ -343,7 +343,7 @@ def _run(
     kept: list[tuple[str, Array]] = []
     steps = procedure.steps(rig)
     paced = rig.capabilities.real_clock or bool(realtime)
-    loop: Loop | None = None
+    account: Account | None = None
     step = next(steps, None)
     # With nothing written, the loop is begun anew after a pause, and what was not kept is forgotten.
     single = path is not None or paced
@@ -353,7 +353,8 @@ def _run(
                 step = _next(steps, _one(loop, step, kept, meta, progress))
                 if not single and step is not None and step.pause > 0.0:
                     break
-    return kept, loop.account() if loop is not None and paced else None
+        account = loop.account()
+    return kept, account if paced else None
 
 
 def _next(steps: Steps, rows: Array) -> Step | None:
