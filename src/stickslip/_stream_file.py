@@ -6,6 +6,7 @@ import json
 import os
 import struct
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,8 @@ class StreamFile:
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"{path} cannot be created ({reason}); give another name") from None
+        found = os.fstat(self._file)
+        self._identity = found.st_dev, found.st_ino
         try:
             allocate(self._file, 0, self._start)
             whole_write(self._file, self._head() + header, 0)
@@ -139,9 +142,12 @@ class StreamFile:
             self._file = -1
 
     def discard(self) -> None:
-        """Close and remove it: it holds nothing."""
+        """Close and remove it, unless another file has its name by now: it holds nothing."""
         self.close()
-        self.path.unlink(missing_ok=True)
+        with suppress(OSError):
+            found = os.stat(self.path)
+            if (found.st_dev, found.st_ino) == self._identity:
+                self.path.unlink()
 
     def _head(self) -> bytes:
         return HEAD.pack(MAGIC, self._start, self._count, len(self._header), 0)
@@ -171,12 +177,13 @@ def allocate(file: int, offset: int, size: int) -> None:
 def load(path: str | os.PathLike[str]) -> Contents:
     """What a record is made of, from a stream's file, also in one that is being written or whose writer was killed.
 
-    ``meta["complete"]`` is true where it was closed.
+    ``meta["complete"]`` is true where it was closed. Else rows may be missing at the end: ``meta["rows_lost"]`` counts
+    those that a crash of the machine kept from the disk.
 
     Raises
     ------
     InputError
-        If it is not such a file.
+        If it is not such a file, or its times do not increase.
     """
     try:
         with open(path, "rb") as file:
@@ -199,10 +206,23 @@ def load(path: str | os.PathLike[str]) -> Contents:
         raise InputError(f"{path} is not a record of this package ({error})") from None
     values = np.frombuffer(data, dtype="<f8", count=len(data) // 8)
     rows = values[: len(values) // len(units) * len(units)].reshape(-1, len(units))
-    # After a crash of the whole machine the number may have reached the disk before the rows: these hold zeros.
-    late = np.flatnonzero(~(np.diff(rows[:, 0]) > 0.0))
-    whole = rows[: late[0] + 1] if late.size else rows
-    return contents(units, absent, whole, meta)
+    lost = 0 if meta["complete"] else empty_end(rows)
+    if lost:
+        rows, meta = rows[:-lost], {**meta, "rows_lost": lost}
+    back = np.flatnonzero(~(np.diff(rows[:, 0]) > 0.0))
+    if back.size:
+        at = int(back[0])
+        raise InputError(
+            f"{path}: time goes from {rows[at, 0]:.9g} to {rows[at + 1, 0]:.9g} s after row {at + 1} of {len(rows)}, "
+            "and must increase; record the run again with a rig whose clock advances in every sample"
+        )
+    return contents(units, absent, rows, meta)
+
+
+def empty_end(rows: Array) -> int:
+    """How many rows at the end hold zeros alone: their number had reached the disk before they did."""
+    written = np.flatnonzero(np.any(rows != 0.0, axis=1))
+    return len(rows) - max(1, int(written[-1]) + 1 if written.size else 1) if len(rows) else 0
 
 
 def contents(

@@ -13,6 +13,7 @@ The tree of exceptions::
     │   ├── LimitCrossed              position, speed, torque, temperature or following error
     │   ├── MessageLost               a message to or from the rig did not arrive in time
     │   ├── DriveFault                the rig itself reported a fault
+    │   ├── MeasurementFault          readings or clock of the rig stand still, jump or contradict the torque
     │   ├── Overrun                   a controller in Python took more than its time
     │   ├── RecordFault               the record could not be written: a full disk
     │   └── Interrupted               a signal asked for the end
@@ -45,6 +46,7 @@ __all__ = [
     "Interrupted",
     "LawError",
     "LimitCrossed",
+    "MeasurementFault",
     "MessageLost",
     "ModelRemark",
     "Overrun",
@@ -144,6 +146,10 @@ class MessageLost(RigError):
 
 class DriveFault(RigError):
     """The rig itself reported a fault."""
+
+
+class MeasurementFault(RigError):
+    """The rig's readings or its clock stand still, jump or contradict the torque command."""
 
 
 class Overrun(RigError):

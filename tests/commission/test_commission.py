@@ -11,6 +11,8 @@ import pytest
 import tomli_w
 
 from stickslip.analyse.tracking import tracking_metrics
+from stickslip.cli import main
+from stickslip.cli._files import listed, written
 from stickslip.commission import commission as commissioning
 from stickslip.commission.commission import commission, planned, tried
 from stickslip.commission.recommended import Following, write_identified_machine, write_recommended
@@ -289,16 +291,68 @@ def test_an_interrupted_commissioning_goes_on_from_its_records(monkeypatch, tmp_
 
 def test_a_folder_with_results_or_another_rigs_records_is_refused(tmp_path):
     rig = VirtualRig(OTHER)
-    claimed(tmp_path, rig, anew=False)
-    commissioning._Course(rig, tmp_path, lambda _: None, False).run(Track(duration=0.2, bandwidth=8.0))
-    claimed(tmp_path, rig, anew=False)
-    with pytest.raises(InputError, match=r"track\.npz is a record of 'virtual other'.*thesis-dry.*--force"):
-        claimed(tmp_path, virtual_rig("thesis-dry"), anew=False)
+
+    def claim(rig, anew=False):
+        claimed(tmp_path, rig, anew=anew, own=listed)
+
+    claim(rig)
+    commissioning._Course(rig, tmp_path, lambda _: None, False).run(
+        Track(duration=0.2, bandwidth=8.0), name="track-100-alone"
+    )
+    claim(rig)
+    with pytest.raises(InputError, match=r"alone\.npz is a record of 'virtual other'.*thesis-dry.*--force"):
+        claim(virtual_rig("thesis-dry"))
     (tmp_path / "model.toml").write_text("")
+    written([tmp_path / "model.toml"])
     with pytest.raises(InputError, match=r"holds model\.toml already; give another folder with --out"):
-        claimed(tmp_path, rig, anew=False)
-    claimed(tmp_path, rig, anew=True)
+        claim(rig)
+    claim(rig, anew=True)
     assert not (tmp_path / "model.toml").exists()
+
+
+@pytest.mark.parametrize("name", ["model.toml", "report.html", "inertia.npz", "track-75-mean.npz"])
+@pytest.mark.parametrize("force", [[], ["--force"]])
+def test_files_of_somebody_else_are_not_overwritten(name, force, tmp_path, capsys):
+    (tmp_path / name).write_bytes(b"PK my own")
+    (tmp_path / "notes.npz").write_bytes(b"mine, in nobody's way")
+    assert main(["rig", "commission", "--rig", "ideal", "--out", str(tmp_path), *force]) == 2
+    error = capsys.readouterr().err
+    assert name in error
+    assert "--out" in error
+    assert (tmp_path / name).read_bytes() == b"PK my own"
+    assert (tmp_path / "notes.npz").exists()
+
+
+def test_a_damaged_record_is_named(tmp_path):
+    rig, short = VirtualRig(OTHER), Track(duration=0.2, bandwidth=8.0)
+    course = commissioning._Course(rig, tmp_path, lambda _: None, False, True)
+    course.run(short, name="track-100-mean")
+    file = tmp_path / "track-100-mean.npz"
+    file.write_bytes(file.read_bytes()[:-400])
+    content = file.read_bytes()
+    for again in (
+        lambda: claimed(tmp_path, rig, anew=False, own=listed),
+        lambda: course.run(short, name="track-100-mean"),
+    ):
+        with pytest.raises(
+            InputError, match=r"track-100-mean\.npz is not a record .*; move it away, so that"
+        ):
+            again()
+    assert file.read_bytes() == content
+
+
+def test_a_resumed_commissioning_reports_where_it_starts(tmp_path):
+    rig, said = VirtualRig(OTHER), []
+    first = Track(duration=0.3, bandwidth=8.0)
+    commissioning._Course(rig, tmp_path, said.append, False, True).run(first, name="track-100-mean")
+    course = commissioning._Course(VirtualRig(OTHER), tmp_path, said.append, False, True)
+    left = course.run(first, name="track-100-mean").record["position"][-1]
+    assert not course.notes
+    start = course.run(first, name="track-75-mean").record["position"][0]
+    assert len(course.notes) == 1
+    assert f"track-75-mean starts at {start:.4g} rad" in course.notes[0]
+    assert f"ended at {left:.4g} rad" in course.notes[0]
+    assert said[-1] == course.notes[0]
 
 
 def test_the_tracking_runs_are_said_once():

@@ -40,7 +40,7 @@ pytestmark = pytest.mark.flaky(reruns=2)
 NODE = 5
 CHANNEL = "239.74.163.2"
 LOG = struct.Struct("<qdqd")
-LIMITS = Limits(torque=1.0, speed=60.0, following_error=1.0, stop_time=0.02)
+LIMITS = Limits(torque=1.0, speed=60.0, following_error=1.0, stop_time=0.02, answer_time=1.0)
 PD = Controller(pd(19.7612, 0.1747), torque_limit=0.9)
 DROP_ANSWERS, LATE_ANSWERS, TRIP, SAFE_TORQUE_OFF, DROP_COMMANDS = range(1, 6)
 

@@ -87,6 +87,11 @@ def test_a_rig_that_cannot_be_closed(tmp_path):
     assert Record.load(tmp_path / "a.stream").meta["complete"] is True
 
 
+def test_a_procedure_reports_a_rig_that_cannot_be_closed():
+    with pytest.raises(RigError, match="close raised OSError: cable"):
+        perform(Presliding(frequency=5.0, amplitude=0.1), broken("close", OSError("cable")))
+
+
 MINE = """
 from stickslip.rigs.files import limits_in
 from stickslip.rigs.virtual import virtual_rig

@@ -68,7 +68,7 @@ def test_from_a_file(recorded, tmp_path):
     )
     rig = read_rig(path)
     assert isinstance(rig, Rig)
-    assert rig.limits == Limits(torque=LIMITS.torque, speed=LIMITS.speed)
+    assert (rig.limits.torque, rig.limits.speed) == (LIMITS.torque, LIMITS.speed)
     assert rig.open().position == Record.load(recorded)["position"][0]
 
 

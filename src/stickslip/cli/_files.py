@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from stickslip.verbs.own_files import LEDGER, ours, refuse_foreign, written
+from stickslip.verbs.own_files import LEDGER, listed, ours, refuse_foreign, written
 
-__all__ = ["LEDGER", "force_argument", "ours", "refuse_foreign", "written"]
+__all__ = ["LEDGER", "force_argument", "listed", "ours", "refuse_foreign", "written"]
 
 
 def force_argument(parser: argparse.ArgumentParser) -> None:

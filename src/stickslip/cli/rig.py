@@ -80,7 +80,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         action.add_argument(
             "--limit", action="append", default=[], metavar="NAME=VALUE",
             help="tighter limit than the rig's: torque, speed, lowest_position, highest_position, temperature, "
-            "following_error, stop_time (SI units)",
+            "following_error, stop_time, answer_time, standstill_torque (SI units)",
         )  # fmt: skip
         action.add_argument("--dry-run", action="store_true", help="print the plan without moving")
         action.add_argument(
@@ -213,7 +213,7 @@ def commissioned(args: argparse.Namespace) -> int:
     from stickslip.cli import _output
     from stickslip.commission.commission import commission
     from stickslip.commission.headline import headline
-    from stickslip.commission.resume import claimed
+    from stickslip.commission.resume import RESULTS, claimed
     from stickslip.errors import InputError
     from stickslip.study.files import prepared_folder
 
@@ -223,7 +223,7 @@ def commissioned(args: argparse.Namespace) -> int:
     if args.out.is_file():
         raise InputError(f"--out {args.out} is a file; give a folder")
     folder: Path = prepared_folder(args.out)
-    claimed(folder, rig, anew=args.force)
+    claimed(folder, rig, anew=args.force, own=_files.listed)
     try:
         found = commission(
             rig,
@@ -239,7 +239,10 @@ def commissioned(args: argparse.Namespace) -> int:
         ) from None
     track = f"stickslip rig run track --rig {args.rig} --set compensator=recommended"
     lines = headline(found, f"{track} --set model={folder / 'recommended.toml'}")
-    model, report = write_commissioned(found, rig, folder, lines)
+    try:
+        model, report = write_commissioned(found, rig, folder, lines)
+    finally:
+        _files.written(path for name in RESULTS if (path := folder / name).exists())
     if args.json:
         said = {word.lower(): line for word, line in lines}
         _output.print_json({**found.result.as_dict(), "headline": said, "folder": str(folder)})

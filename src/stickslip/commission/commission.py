@@ -119,18 +119,40 @@ class _Course:
     without_watchdog: bool
     resume: bool = False
     stages: list[Stage] = field(default_factory=list[Stage])
+    notes: list[str] = field(default_factory=list[str])
+    last: tuple[str, float] | None = None
+    """The stage whose record was taken last, and the angle at which it ended, rad"""
 
     def run(self, procedure: Procedure, *, insist: bool = True, name: str = "") -> Performed:
         """Perform, save under a name (the procedure's) and insist on the checks; or take the record that lies there."""
-        file = self.folder / f"{name or procedure.name}.npz" if self.folder is not None else None
-        if file and self.resume and (done := kept(file, procedure, self.rig, insist=insist)):
-            self.progress(f"{name or procedure.name}: as recorded with the same settings in {file}")
-            return done
-        self.progress(f"{name or procedure.name}: {'; '.join(procedure.plan(self.rig).text)}")
+        called = name or procedure.name
+        file = self.folder / f"{called}.npz" if self.folder is not None else None
+        if file and self.resume:
+            done = kept(file, procedure, self.rig, insist=insist)
+            if isinstance(done, Performed):
+                self.progress(f"{called}: as recorded with the same settings in {file}")
+                self.last = called, float(done.record["position"][-1])
+                return done
+            if done:
+                self.progress(f"{called}: measured again; {file} was recorded {done}")
+        self.progress(f"{called}: {'; '.join(procedure.plan(self.rig).text)}")
         done = perform(procedure, self.rig, without_watchdog=self.without_watchdog)
+        self._note_resumption(called, float(done.record["position"][0]))
         if file is not None:
             stamped(done.record, procedure, self.rig).save(file)
         return done.insist() if insist else done
+
+    def _note_resumption(self, name: str, angle: float) -> None:
+        """Report that a stage did not start where an uninterrupted commissioning would have started it."""
+        if self.last is None:
+            return
+        before, ended = self.last
+        self.last = None
+        self.notes.append(
+            f"Resumed: {name} starts at {angle:.4g} rad, while {before} had ended at {ended:.4g}"
+            " rad. The records from here on differ from those of an uninterrupted run in angle and temperature."
+        )
+        self.progress(self.notes[-1])
 
     def add(self, name: str, done: Performed, found: Identification | None, note: str = "") -> None:
         """Keep a stage."""
@@ -227,6 +249,7 @@ def commission(
             lambda: _recommended(course, j, top, fs, model, stiffness, angle, lugre.model if lugre else None)
         )
         said = (*said, *unsaid)
+    said = (*said, *course.notes)
     result = result_of(course.stages, model, j, stiffness, said, angle, recommended, the_map)
     return Commissioned(
         tuple(course.stages), j, model, lugre.model if lugre else None, angle, recommended, stiffness, result,

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.record import Record
@@ -16,24 +15,39 @@ from stickslip.rigs.rig import Rig
 
 RESULTS = ("model.toml", "machine.toml", "recommended.toml", "report.html")
 """What a commissioning writes at its end."""
+RECORDS = (
+    "inertia", "breakaway", "sliding", "presliding", "attraction", "stickslip", "cogging", "resonance", "track-*",
+)  # fmt: skip
+"""Names of its records, without `.npz`."""
 
 
-def claimed(folder: Path, rig: Rig, *, anew: bool) -> None:
-    """Claim a folder for a commissioning of a rig; the records of an interrupted one of the same rig may lie in it.
+def claimed(folder: Path, rig: Rig, *, anew: bool, own: Callable[[Path], bool]) -> None:
+    """Claim a folder for a commissioning of a rig; it may contain the records of an interrupted one of the same rig.
 
     Parameters
     ----------
     folder : Path
     rig : Rig
     anew : bool
-        Whether results that lie there give way.
+        Whether earlier results are removed.
+    own : callable
+        Whether a result was written by this package.
 
     Raises
     ------
     InputError
-        If it holds results, or records of another rig, and not `anew`.
+        If it contains results or records of another rig, and not `anew`; or, under a name that a commissioning
+        writes, a file of somebody else or a damaged record.
     """
     results = [folder / name for name in RESULTS if (folder / name).exists()]
+    for path in results:
+        if not own(path):
+            raise InputError(
+                f"{path} was not written by a commissioning, which would overwrite it; move it, or give another folder "
+                "with --out"
+            )
+    records = [path for name in RECORDS for path in sorted(folder.glob(f"{name}.npz"))]
+    owners = {path: loaded(path).meta.get("rig", rig.name) for path in records}
     if anew:
         for path in results:
             path.unlink()
@@ -41,10 +55,32 @@ def claimed(folder: Path, rig: Rig, *, anew: bool) -> None:
     remedy = "give another folder with --out, or --force to measure all of it again"
     if results:
         raise InputError(f"{folder} holds {', '.join(p.name for p in results)} already; {remedy}")
-    for path in sorted(folder.glob("*.npz")):
-        owner = _meta(path).get("rig", rig.name)
+    for path, owner in owners.items():
         if owner != rig.name:
             raise InputError(f"{path} is a record of {owner!r}, and this is {rig.name!r}; {remedy}")
+
+
+def loaded(path: Path) -> Record:
+    """A record that a commissioning has saved.
+
+    Raises
+    ------
+    InputError
+        If it is none, or damaged.
+    """
+    try:
+        record = Record.load(path)
+    except InputError as error:
+        raise InputError(
+            f"{str(error).rstrip('.')}; move it away, so that this stage is measured again, or give another folder "
+            "with --out"
+        ) from None
+    if "settings" not in record.meta:
+        raise InputError(
+            f"{path} was not written by a commissioning, which would overwrite it; move it, or give another folder "
+            "with --out"
+        )
+    return record
 
 
 def stamped(record: Record, procedure: Procedure, rig: Rig) -> Record:
@@ -54,21 +90,25 @@ def stamped(record: Record, procedure: Procedure, rig: Rig) -> Record:
     )
 
 
-def kept(path: Path, procedure: Procedure, rig: Rig, *, insist: bool) -> Performed | None:
-    """What was recorded in a file, if that was done with the same settings; None else.
+def kept(path: Path, procedure: Procedure, rig: Rig, *, insist: bool) -> Performed | str:
+    """What was recorded in a file, or why it is measured again; empty where there is no file.
 
     With `insist`, a record that failed a check is none: it would fail at the same place for ever.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, or not of a commissioning.
     """
-    if not path.is_file() or _meta(path).get("settings") != settings(procedure, rig):
-        return None
-    try:
-        record = Record.load(path)
-    except InputError:
-        return None
+    if not path.is_file():
+        return ""
+    record = loaded(path)
+    if record.meta["settings"] != settings(procedure, rig):
+        return "with other settings"
     checks = tuple(Check(**c) for c in record.meta["checks"])
     segments = tuple((str(label), int(begin), int(end)) for label, begin, end in record.meta["segments"])
     done = Performed(record, checks, procedure.plan(rig), segments)
-    return done if done.passed or not insist else None
+    return done if done.passed or not insist else "with a check that failed"
 
 
 def settings(procedure: Procedure, rig: Rig) -> str:
@@ -82,13 +122,3 @@ def settings(procedure: Procedure, rig: Rig) -> str:
         },
         sort_keys=True,
     )  # fmt: skip
-
-
-def _meta(path: Path) -> dict[str, Any]:
-    """The meta of a record's file, without its channels; nothing where it is none."""
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            found: dict[str, Any] = json.loads(str(data["__header__"]))["meta"]
-            return found
-    except Exception:  # NumPy, zip, zlib and JSON each raise their own on a damaged file
-        return {}

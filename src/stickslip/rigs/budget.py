@@ -1,8 +1,8 @@
-"""The time that a controller written in Python may take, and what is done when it takes more.
+"""The time that a call may take which the loop waits for, and what is done when it takes more.
 
-A controller that is a little late now and then does no harm; one that falls ever further behind, or does not come back,
-leaves its last torque on the axis. How far it is behind the clock is summed up, and beyond its budget the loop stops.
-A thread watches the call under way, and where that does not come back it ramps the torque down itself meanwhile.
+A controller in Python or a rig that is a little late now and then does no harm; one that falls ever further behind, or
+does not come back, leaves its last torque on the axis. How far it is behind the clock is summed up, and beyond its
+budget the loop stops. A thread watches the calls under way, and stops the rig while a call does not come back.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import threading
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from typing import ParamSpec, TypeVar
 
-from stickslip.errors import Overrun
-from stickslip.rigs.rig import Measurement, Setpoint
+from stickslip.errors import RigError
 
 BUDGET = 0.1
 """s, by which a controller may be behind if nothing else is said"""
@@ -22,75 +22,104 @@ FIRST = 10.0
 LOOKS = 5
 """Times that the thread looks within the budget"""
 
+P = ParamSpec("P")
+Result = TypeVar("Result")
+Complaint = Callable[[float], RigError]
+"""The error for a call that took so many seconds"""
+
 
 class Budget:
-    """Calls a controller and counts its time.
+    """Makes calls and counts their time.
 
     Parameters
     ----------
-    sample_time : float
+    allowed : float
         What a call may take without falling behind, s.
     budget : float
-        By how much the controller may be behind the clock, s.
+        By how much the calls may be behind the clock, s.
+    complaint : callable
+        The error for a call that is further behind.
     take_over : callable
-        Called with what is wrong by the watching thread, while the controller's call is under way: it stops the rig.
-    rests : bool
-        No torque stands yet, so that the first call may take `FIRST`.
+        Called with that error by the watching thread, while the call is under way: it stops the rig.
+    lenient : bool
+        The first call may take `FIRST`.
     """
 
     def __init__(
-        self, sample_time: float, budget: float, take_over: Callable[[Overrun], None], *, rests: bool = False
+        self,
+        allowed: float,
+        budget: float,
+        complaint: Complaint,
+        take_over: Callable[[RigError], None],
+        *,
+        lenient: bool = False,
     ) -> None:
-        self._sample_time, self._budget, self._take_over = sample_time, budget, take_over
-        self._behind = -max(0.0, FIRST - budget) if rests else 0.0
+        self.budget = budget
+        self._allowed, self._complaint, self._take_over = allowed, complaint, take_over
+        self._behind = -max(0.0, FIRST - budget) if lenient else 0.0
         self._since = 0.0
+        self._spent = False
         self._lock = threading.Lock()
-        self._over = threading.Event()
 
-    @contextmanager
-    def watched(self) -> Generator[None]:
-        """Watch the calls inside."""
-        watcher = threading.Thread(target=self._watch, name="budget", daemon=True)
-        watcher.start()
-        try:
-            yield
-        finally:
-            self._over.set()
-            watcher.join()
-
-    def call(
-        self, controller: Callable[[Measurement, Setpoint], float], measured: Measurement, setpoint: Setpoint
-    ) -> float:
-        """The controller's torque, N·m.
+    def call(self, function: Callable[P, Result], *args: P.args, **kwargs: P.kwargs) -> Result:
+        """What a function returns.
 
         Raises
         ------
-        Overrun
+        RigError
             If it is further behind than its budget.
         """
         self._since = time.monotonic()
         try:
-            torque = controller(measured, setpoint)
+            found = function(*args, **kwargs)
         finally:
             with self._lock:  # once the thread has taken over, this waits for the end of its ramp
                 took = time.monotonic() - self._since
                 self._since = 0.0
-                late = self._behind + took - self._sample_time
+                late = self._behind + took - self._allowed
                 self._behind = max(0.0, late)
-        if late > self._budget:
-            raise self._error(took)
-        return torque
+        if late > self.budget:
+            self._behind = 0.0  # the calls of the ramp have their own
+            raise self._complaint(took)
+        return found
 
-    def _watch(self) -> None:
-        while not self._over.wait(self._budget / LOOKS):
-            with self._lock:
-                took = time.monotonic() - self._since
-                if self._since and self._behind + took - self._sample_time > self._budget:
-                    self._take_over(self._error(took))
-                    return
+    def look(self) -> None:
+        """Stop the rig, once, if the call under way is beyond its budget."""
+        with self._lock:
+            took = time.monotonic() - self._since
+            if not self._spent and self._since and self._behind + took - self._allowed > self.budget:
+                self._spent = True
+                self._take_over(self._complaint(took))
 
-    def _error(self, took: float) -> Overrun:
-        return Overrun(
-            f"the controller took {1e3 * took:.3g} ms in a sample of {1e3 * self._sample_time:.3g} ms and is more than "
-            f"its budget of {1e3 * self._budget:.3g} ms behind the clock; make it faster, or give Loop a greater budget"
-        )
+
+class Watch:
+    """The thread that looks at the calls under way."""
+
+    def __init__(self) -> None:
+        self._budgets: list[Budget] = []
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._look, name="watch", daemon=True)
+
+    @contextmanager
+    def running(self) -> Generator[None]:
+        """Watch until the end of the block."""
+        self._thread.start()
+        try:
+            yield
+        finally:
+            self._over.set()
+            self._thread.join()
+
+    @contextmanager
+    def over(self, budget: Budget) -> Generator[Budget]:
+        """Watch the calls of a budget inside the block."""
+        self._budgets = [*self._budgets, budget]
+        try:
+            yield budget
+        finally:
+            self._budgets = [b for b in self._budgets if b is not budget]
+
+    def _look(self) -> None:
+        while not self._over.wait(min((b.budget for b in self._budgets), default=BUDGET) / LOOKS):
+            for budget in self._budgets:
+                budget.look()

@@ -13,6 +13,8 @@ from stickslip.rigs import cia402 as cia
 if TYPE_CHECKING:
     import canopen
 
+STANDARD = [{"can_id": 0, "can_mask": 0, "extended": False}]
+"""python-can's filter that lets 11-bit identifiers alone through"""
 FORMATS = {1: "<B", 2: "<H", 4: "<I"}
 
 
@@ -48,7 +50,8 @@ class CanopenNode:
         network = canopen.Network()
         network.NOTIFIER_CYCLE = 0.02
         try:
-            arguments: dict[str, Any] = dict(bus)
+            # Identifiers of 29 bits belong to other protocols: cut to 11 bits they would be this node's.
+            arguments: dict[str, Any] = {"can_filters": STANDARD, **bus}
             network.bus = can.Bus(**arguments)
             network.connect()  # pyright: ignore[reportUnknownMemberType]
         except (can.CanError, OSError, ValueError, TypeError) as error:
@@ -78,8 +81,8 @@ class CanopenNode:
         return network
 
     def on_emergency(self, _: int, data: bytearray, __: float) -> None:
-        """Keep the code of an emergency."""
-        self.error = struct.unpack_from("<H", data)[0]
+        """Keep the code of an emergency; that its cause is gone (code 0) does not undo it."""
+        self.error = struct.unpack_from("<H", data)[0] or self.error
 
     # ---- its objects -------------------------------------------------------------------------------------------
 

@@ -37,6 +37,33 @@ NEXT = {
 HOMED, HOMING_ERROR = 1 << 12, 1 << 13  # of the statusword in homing mode
 UNKNOWN_FAULT = 0xFFFF
 """Where a drive shows a fault and has not said which"""
+KEPT = {1 << 4: "that its voltage is off", 1 << 9: "that it is no longer remote: it ignores the controlword"}
+"""Bits of the statusword that a drive may lack, but must not lose"""
+
+# ---- what is heard on the bus -----------------------------------------------------------------------------------
+MODE_QUESTION = bytes([0x40, MODE_SHOWN & 0xFF, MODE_SHOWN >> 8, 0, 0, 0, 0, 0])
+"""SDO: upload of the mode of operation"""
+ABORT = 0x80  # of SDO
+BUS_OFF = 0x40  # of an error frame, as SocketCAN numbers them
+OPERATIONAL = 5
+NMT = {0x02: "stop", 0x80: "enter pre-operational", 0x81: "reset node", 0x82: "reset communication"}
+"""Commands after which a node exchanges no PDO"""
+
+
+def interference(service: int, data: bytes, node: int) -> str:
+    """What a frame of another node means for the run of this one, by its 11-bit identifier; empty: nothing."""
+    if service == 0x80:
+        return "another device sends SYNC on this bus: two masters cannot share it"
+    if service == 0x200 + node:
+        return f"another master commands this drive (RPDO {service:03X}h)"
+    if service == 0 and len(data) == 2 and data[1] in (0, node) and data[0] in NMT:
+        return f"another master has sent the NMT command {NMT[data[0]]!r}"
+    if service == 0x700 + node and len(data) == 1:
+        if data[0] == 0:
+            return "the drive has restarted (boot-up message)"
+        if data[0] & 0x7F != OPERATIONAL:
+            return f"the drive is no longer operational (NMT state {data[0] & 0x7F} in its heartbeat)"
+    return ""
 
 
 def state_of(status: int) -> str:

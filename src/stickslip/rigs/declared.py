@@ -60,6 +60,14 @@ def blamed(rig: Rig, doing: str) -> Generator[None]:
         raise RigError(f"{rig.name}: {doing} raised {type(error).__name__}: {error}") from error
 
 
+def last_resort(rig: Rig) -> str:
+    """What takes the torque away where the loop cannot."""
+    watchdog = rig.capabilities.watchdog
+    if watchdog is None:
+        return "it declares no watchdog: switch its power off"
+    return f"its watchdog takes the torque away within {watchdog.time:g} s ({watchdog.how})"
+
+
 def answer(rig: Rig, doing: str, ask: Callable[[], Any]) -> Any:
     """What a rig answers, as `Measurement` has it.
 

@@ -8,6 +8,10 @@ The drive guards itself (CiA 301 and 402): it watches the RPDO (its event timer,
 process (1016h), and on their absence does what 6007h says, here "disable voltage". Both are sent by the loop itself,
 so that a loop that hangs is missed as one that was killed is.
 
+Another master must not interfere. Its SYNC, its commands (RPDO, NMT) and a restart of the drive are heard on the bus;
+the mode of operation, which no PDO has room for, is asked for by SDO every `MODE_PERIOD`. Each ends the run, as an
+emergency does. Frames with identifiers of 29 bits belong to other protocols.
+
 Configuration uses `canopen`; during the run the bus is read in the loop's own thread, since handing frames from
 thread to thread costs more than a sample has. `pip install 'stickslip[canopen]'` brings canopen (MIT) and
 python-can (LGPL).
@@ -19,8 +23,9 @@ import contextlib
 import math
 import struct
 import time
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from stickslip.config import Table
@@ -34,6 +39,8 @@ COMMAND, ANSWER = struct.Struct("<Hh"), struct.Struct("<Hih")
 WATCHDOGS = ("rpdo", "heartbeat", "none")
 OWN_NODE = 127
 """Node number of this process, for its heartbeat"""
+MODE_PERIOD, MODE_ANSWER = 0.02, 1.0
+"""s from one question for the mode of operation to the next, and that an answer may take"""
 
 
 @dataclass(frozen=True)
@@ -56,7 +63,8 @@ class Settings:
     reset_fault : bool
         Reset a fault that the drive shows when it is opened.
     timeout : float
-        How long the answer to a SYNC is waited for, s: so much later is a lost one known, and the stop begun.
+        How long the answer to a SYNC is waited for, s: so much later is a lost one known, and the stop begun. The
+        limit ``answer_time`` is at least twice as long.
     """
 
     bus: Mapping[str, Any]
@@ -91,7 +99,8 @@ class Ds402:
 
     def __post_init__(self) -> None:
         s = self.settings
-        self.name, self.sample_time, self.limits = f"ds402 node {s.node}", s.sample_time, s.limits
+        self.name, self.sample_time = f"ds402 node {s.node}", s.sample_time
+        self.limits = replace(s.limits, answer_time=max(s.limits.answer_time, 2.0 * s.timeout))
         how = {"rpdo": "the drive misses the cyclic torque", "heartbeat": "the drive misses the heartbeat"}
         watchdog = None if s.watchdog == "none" else Watchdog(s.watchdog_time, how[s.watchdog])
         self.capabilities = Capabilities(watchdog)
@@ -100,6 +109,11 @@ class Ds402:
         self._begin = 0
         self._lost = False
         self._armed = False
+        self._found = ""
+        self._status = 0
+        self._asked = self._told = 0.0
+        self._sent: Counter[tuple[int, bytes]] = Counter()
+        self._echo: bool | None = None
 
     # ---- the rig ---------------------------------------------------------------------------------------------
 
@@ -120,8 +134,12 @@ class Ds402:
         network.send_message(0, bytes([0x80, self.settings.node]))  # pre-operational
         assert network.notifier is not None
         network.notifier.stop(1.0)  # from now on this thread reads the bus
-        network.send_message(0, bytes([0x01, self.settings.node]))  # operational
+        self._sent.clear()
+        self._echo = None
+        self._post(0, bytes([0x01, self.settings.node]))  # operational
         self._begin = time.monotonic_ns()
+        self._found, self._status, self._node.error = "", 0, 0
+        self._asked = self._told = time.monotonic()
         return self._enable()
 
     def exchange(self, torque: float) -> Measurement:
@@ -136,8 +154,13 @@ class Ds402:
         """
         status, measured = self._cycle(cia.ENABLE, torque)
         state = cia.state_of(status)
-        if state in ("fault", "fault reaction active"):
+        if state in ("fault", "fault reaction active") or self._node.error:
             return measured._replace(status=float(self._node.error or cia.UNKNOWN_FAULT))
+        if gone := [text for bit, text in cia.KEPT.items() if self._status & ~status & bit]:
+            raise DriveFault(
+                f"{self.name}: the drive reports {gone[0]} (statusword 0x{status:04X})", measured.time
+            )
+        self._status = status
         if state != "operation enabled":
             raise DriveFault(
                 f"{self.name}: the drive is in state {state!r} (statusword 0x{status:04X})", measured.time
@@ -276,10 +299,9 @@ class Ds402:
             if state == "operation enabled":
                 self._armed, self._lost = True, False
                 return measured
-            if state in ("fault", "fault reaction active"):
-                raise DriveFault(
-                    f"{self.name}: fault 0x{self._node.error:04X} while it is enabled", measured.time
-                )
+            if state in ("fault", "fault reaction active") or self._node.error:
+                code = self._node.error or cia.UNKNOWN_FAULT
+                raise DriveFault(f"{self.name}: fault 0x{code:04X} while it is enabled", measured.time)
             if time.monotonic() > end:
                 raise DriveFault(f"{self.name}: the drive stays in state {state!r} while it is enabled")
             word = cia.NEXT.get(state, cia.DISABLE)
@@ -289,12 +311,33 @@ class Ds402:
     def _send(self, word: int, torque: float) -> None:
         network = self._node.network
         per_mille = max(-32768, min(32767, round(1e3 * torque / self._rated)))
-        network.send_message(0x200 + self.settings.node, COMMAND.pack(word, per_mille))
-        network.send_message(0x80, b"")
+        self._post(0x200 + self.settings.node, COMMAND.pack(word, per_mille))
+        self._post(0x80, b"")
+        if (now := time.monotonic()) - self._asked > MODE_PERIOD:
+            self._asked = now
+            network.send_message(0x600 + self.settings.node, cia.MODE_QUESTION)
+            if now - self._told > MODE_ANSWER:
+                self._found = self._found or f"no answer to upload of {cia.MODE_SHOWN:04X}h"
         if self.settings.watchdog == "heartbeat":
             if self._beats % self._beat_every == 0:
                 network.send_message(0x700 + OWN_NODE, b"\x05")
             self._beats += 1
+
+    def _post(self, service: int, data: bytes) -> None:
+        """Send what nobody else may send, and know it again on a bus that hands back what is sent."""
+        self._node.network.send_message(service, data)
+        if self._echo is not False:
+            self._sent[service, data] += 1
+
+    def _is_echo(self, service: int, data: bytes) -> bool:
+        """Whether a frame is one of this process, which some buses hand back."""
+        if not self._sent.get((service, data)):
+            return False
+        self._echo = True
+        self._sent[service, data] -= 1
+        if not self._sent[service, data]:
+            del self._sent[service, data]
+        return True
 
     def _cycle(self, word: int, torque: float) -> tuple[int, Measurement]:
         """One sample: statusword and measurement."""
@@ -310,7 +353,7 @@ class Ds402:
             patience = 0.5 * self.sample_time if self._lost else self.settings.timeout
             end = sent + int(1e9 * patience)
             answer = None
-            while answer is None:
+            while answer is None and not self._found:
                 left = end - time.monotonic_ns()
                 message = bus.recv(1e-9 * left) if left > 0 else None
                 if message is None:
@@ -321,6 +364,9 @@ class Ds402:
         except Exception as error:  # python-can's drivers raise their own
             self._lost = True
             raise MessageLost(f"{self.name}: the bus failed ({error})") from error
+        if self._found:
+            self._lost = True
+            raise DriveFault(f"{self.name}: {self._found}", 1e-9 * (sent - self._begin))
         if answer is None:
             self._lost = True
             raise MessageLost(
@@ -335,12 +381,49 @@ class Ds402:
         )
 
     def _heed(self, message: Any) -> bytes | None:
-        """Take a frame in; the data of the TPDO, where it is one."""
-        if message.arbitration_id == 0x180 + self.settings.node:
-            return bytes(message.data) if len(message.data) == ANSWER.size else None
-        if message.arbitration_id == 0x80 + self.settings.node and len(message.data) >= 2:
-            self._node.on_emergency(0, message.data, 0.0)
+        """Take a frame in; the data of the TPDO, where it is one. What ends the run is kept in `_found`."""
+        if message.is_error_frame:
+            if message.arbitration_id & cia.BUS_OFF:
+                self._found = self._found or "the bus is off"
+            return None
+        if message.is_extended_id or message.is_remote_frame or not message.is_rx:
+            return None
+        if self._is_echo(message.arbitration_id, bytes(message.data)):
+            return None
+        service, data, node = message.arbitration_id, bytes(message.data), self.settings.node
+        if service == 0x180 + node:
+            if len(data) == ANSWER.size:
+                if self._echo is None:  # an echo of the SYNC that it answers would have been first
+                    self._echo = False
+                    self._sent.clear()
+                return data
+            found = (
+                f"its TPDO has {len(data)} bytes in place of {ANSWER.size}: another master has mapped it anew"
+            )
+        elif service == 0x80 + node and len(data) >= 2:
+            self._node.on_emergency(0, bytearray(data), 0.0)
+            return None
+        elif service == 0x580 + node:
+            found = self._mode_of(data)
+        else:
+            found = cia.interference(service, data, node)
+        self._found = self._found or found
         return None
+
+    def _mode_of(self, data: bytes) -> str:
+        """What is wrong with the drive's answer about its mode of operation; answers to others are theirs."""
+        if len(data) < 5 or data[1:4] != cia.MODE_QUESTION[1:4]:
+            return ""
+        if data[0] == cia.ABORT:
+            return f"the drive refuses upload of {cia.MODE_SHOWN:04X}h (abort code 0x{data[4:].hex()})"
+        self._told = time.monotonic()
+        mode = int.from_bytes(data[4:5], "little", signed=True)
+        if mode == cia.CYCLIC_TORQUE:
+            return ""
+        return (
+            f"the mode of operation is {mode} in place of {cia.CYCLIC_TORQUE} (cyclic torque): another master has "
+            "changed it"
+        )
 
 
 def whole(value: Any) -> Any:

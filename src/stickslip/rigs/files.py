@@ -80,5 +80,13 @@ def limits_in(table: Table, default: Limits | None = None) -> Limits:
             following_error=t.positive(
                 "following_error", "rad", default.following_error if default else math.inf
             ),
-            stop_time=t.positive("stop_time", "s", default.stop_time if default else 0.02),
+            stop_time=t.positive("stop_time", "s", default.stop_time if default else Limits.stop_time),
+            answer_time=t.positive(
+                "answer_time", "s", default.answer_time if default else Limits.answer_time
+            ),
+            standstill_torque=(
+                t.positive("standstill_torque", "N·m")
+                if t.has("standstill_torque")
+                else (default or Limits).standstill_torque
+            ),
         )

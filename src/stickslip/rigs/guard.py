@@ -5,10 +5,33 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 
-from stickslip.errors import DriveFault, InputError, Interrupted, LimitCrossed, RigError
+from stickslip.errors import (
+    DriveFault,
+    InputError,
+    Interrupted,
+    LimitCrossed,
+    MeasurementFault,
+    RigError,
+    StickslipError,
+)
 from stickslip.rigs.loop_sample import BOUNDS, MEASURED, REMEMBERED, SAFETY, Control
 from stickslip.rigs.rig import LIMIT_UNITS, Limits
-from stickslip.rigs.safety import ASKED, REASONS, RUNNING, STATUS, STOPPED, STOPPING, UNBOUNDED, Safety
+from stickslip.rigs.safety import (
+    ASKED,
+    CLOCK,
+    FROZEN,
+    IGNORED,
+    NONE,
+    OPPOSED,
+    REASONS,
+    RUNNING,
+    STATUS,
+    STILL,
+    STOPPED,
+    STOPPING,
+    UNBOUNDED,
+    Safety,
+)  # fmt: skip
 from stickslip.stream import Stream
 
 STATE = Safety._fields.index("state")
@@ -65,6 +88,7 @@ class Guard:
                 self._memory[name] = known[name]
             self._memory["open"] = 1.0
         self._safety["origin"] = self._measured["position"]
+        self._safety["begun"] = 0.0
         if self.fault is None:
             self._safety["state"] = RUNNING
 
@@ -81,10 +105,14 @@ class Guard:
     def ask(self, reason: BaseException) -> None:
         """Begin to stop, unless that is under way; the first reason is the one that is told."""
         s = self._safety
-        if s["state"] in (STOPPING, STOPPED):
+        if s["state"] == STOPPED or s["reason"] != NONE:
             return
         self.fault = reason
         s["state"], s["reason"] = STOPPING, ASKED
+
+    def cut(self) -> None:
+        """End without a ramp: the rig has been closed."""
+        self._safety["state"], self._safety["torque"] = STOPPED, 0.0
 
     def begin_ramp(self) -> bool:
         """Begin to take the torque away without a fault; whether there is any."""
@@ -94,15 +122,23 @@ class Guard:
         s["state"] = STOPPING
         return True
 
-    def end_ramp(self) -> None:
-        """The torque is zero: a controller that goes on begins without torque."""
-        self._safety["state"], self._safety["reason"] = RUNNING, 0.0
+    def end_ramp(self) -> bool:
+        """The torque is zero: a controller that goes on begins without torque. Whether nothing went wrong meanwhile."""
+        if self._safety["reason"] != NONE:
+            self._safety["state"] = STOPPED
+            return False
+        self._safety["state"] = RUNNING
         self._memory["open"] = 1.0
+        return True
 
     def at_last(self, fault: BaseException | None) -> None:
         """What went wrong after the last sample; told by leaving the loop, unless something else is."""
         if fault is not None and self.fault is None:
             self.fault, self._late = fault, True
+
+    def leave_untold(self) -> None:
+        """The fault is raised when the loop is left, unless its block raises."""
+        self._late = True
 
     @property
     def untold(self) -> BaseException | None:
@@ -112,11 +148,16 @@ class Guard:
     @property
     def ending(self) -> str:
         """How the run ended, for its record."""
-        return "as planned" if self.fault is None else str(self.fault)
+        if self.fault is None:
+            return "as planned"
+        known = isinstance(self.fault, StickslipError)
+        return str(self.fault) if known else f"{type(self.fault).__name__}: {self.fault}"
 
     def error(self, rig: str, limits: Limits, stream: Stream) -> BaseException:
         """What is raised once the torque is zero."""
         s, at = self._safety, float(self._measured["time"])
+        if not math.isfinite(at):
+            at = float(s["time"])
         if self.fault is None:
             self.fault = crossed(rig, limits, int(s["reason"]), float(s["value"]), at)
         fault = self.fault = told(self.fault)
@@ -133,6 +174,11 @@ def crossed(rig: str, limits: Limits, reason: int, value: float, at: float) -> R
     """The error for what the guarded sample itself saw: the limit, the `value` that crossed it, and when."""
     where = f"at t = {at:.3f} s; the torque was ramped to zero"
     name = REASONS[reason]
+    if reason == CLOCK:
+        return clock_fault(rig, value, f"in one sample {where}")
+    if (found := contradiction(limits, reason, value)) is not None:
+        what, remedy = found
+        return MeasurementFault(f"{rig}: {what} {where}; {remedy}")
     if reason == STATUS:
         code = int(value) if math.isfinite(value) else 0
         return DriveFault(f"{rig} reports fault 0x{code:04X} {where}")
@@ -141,6 +187,46 @@ def crossed(rig: str, limits: Limits, reason: int, value: float, at: float) -> R
     if math.isfinite(value):
         return LimitCrossed(f"an input of the controller, or the torque it computed, is {name} {where}")
     return LimitCrossed(f"position or torque is {value:g}, {name}, {where}")
+
+
+def clock_fault(rig: str, step: float, where: str) -> MeasurementFault:
+    """The error for a clock that does not advance as the samples do."""
+    return MeasurementFault(
+        f"{rig}: its time changes by {step:.6g} s {where}; it must increase by the sample time in every sample; "
+        "correct the rig's clock"
+    )
+
+
+def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] | None:
+    """What is not as expected of a rig's answer (`stickslip.rigs.safety`), and the remedy; None for other reasons."""
+    waited = f"for {limits.answer_time:g} s (limit answer_time)"
+    wiring = (
+        "check the current loop, the sign and the torque constant; a rig that measures no torque returns NaN"
+    )
+    match reason:
+        case _ if reason == STILL:
+            return (
+                f"the position has not changed {waited} under {value:.4g} N·m, which must move the axis",
+                "check encoder, brake and end stops; if it may stand still under this torque, set a greater "
+                "standstill_torque in [rig.limits]",
+            )
+        case _ if reason == FROZEN:
+            return (
+                f"no reading has changed {waited} while the torque command did",
+                "check the connection: the rig repeats an old measurement",
+            )
+        case _ if reason == IGNORED:
+            return (
+                f"the measured torque, {value:.4g} N·m on average, does not follow the command {waited}",
+                wiring,
+            )
+        case _ if reason == OPPOSED:
+            return (
+                f"the torque sensor reads {value:.4g} N·m against the torque with which the motor drives the axis",
+                "invert the sensor's sign",
+            )
+        case _:
+            return None
 
 
 def told(fault: BaseException) -> BaseException:

@@ -4,16 +4,21 @@ In the main thread Python's own handlers note the signal, and the loop's `Interr
 in no other thread, and one that nobody hears ends the process at once. A loop in another thread therefore has the
 system call a compiled handler; when its torque is zero and its record closed, the signal is sent once more, to whom it
 would have gone. All loops of a process hear the same signal.
+
+Some signals cannot be heard, so that only the drive's watchdog takes the torque away: SIGKILL and SIGSTOP, which the
+system gives to no program, and those of a crash (`CRASHES`), after which no code can be relied on.
 """
 
 from __future__ import annotations
 
 import ctypes
 import functools
+import math
 import os
 import signal
 import threading
-from contextlib import ExitStack
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numpy as np
@@ -23,11 +28,13 @@ from stickslip.jit import compiled_notice
 
 ALWAYS = ("SIGINT", "SIGTERM", "SIGBREAK")
 """Heard whatever the program does with them otherwise"""
-UNLESS_USED = (
-    "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGALRM", "SIGVTALRM", "SIGPROF", "SIGUSR1", "SIGUSR2", "SIGXCPU", "SIGIO",
-    "SIGPWR",
-)  # fmt: skip
-"""Heard where they would end or halt the process; not where the program ignores them (`nohup`) or uses them"""
+CRASHES = ("SIGSEGV", "SIGBUS", "SIGILL", "SIGFPE")
+"""The instruction that raised one of them would be run again after a handler, and raise it again."""
+NEVER = ("SIGKILL", "SIGSTOP", *CRASHES, "SIGCHLD", "SIGCONT", "SIGURG", "SIGWINCH")
+"""Not heard: these cannot be, or neither end nor halt the process."""
+TERMINAL = ("SIGTTIN", "SIGTTOU")
+"""Of a background process that uses its terminal: once heard they are ignored, or the same call would raise them again
+without end"""
 
 
 class Signals:
@@ -38,16 +45,25 @@ class Signals:
         self._number = 0
         self._before: dict[int, Any] = {}
         self._released = False
+        self._patience = math.inf
+        self._error: BaseException | None = None
 
     @property
     def number(self) -> int:
         """The signal, or 0."""
         return int(NOTED[0]) if self._hearing else self._number
 
+    def quieten(self) -> None:
+        """Ignore a signal of the terminal (`TERMINAL`) that has come, if the loop is off the main thread."""
+        number = self.number
+        if not self._before and number in _replaced and number in _numbers(TERMINAL) and number not in _quiet:
+            _quiet.add(number)
+            _library().signal(number, int(signal.SIG_IGN))
+
     @property
     def error(self) -> Interrupted:
         """What it is told as."""
-        return Interrupted(f"{signal.Signals(self.number).name} asked for the end")
+        return Interrupted(f"{name_of(self.number)} asked for the end")
 
     def hear(self, undo: ExitStack) -> None:
         """Hear them until `undo`. Off the main thread of a system without POSIX signals nothing can be heard."""
@@ -72,18 +88,44 @@ class Signals:
             elif self.number:
                 os.kill(os.getpid(), self.number)
 
+    @contextmanager
+    def at_once(self) -> Generator[None]:
+        """In this block a signal interrupts what the main thread does: no torque acts."""
+        self._patience = 0
+        try:
+            yield
+        finally:
+            self._patience = math.inf
+
+    @contextmanager
+    def at_the_second(self) -> Generator[None]:
+        """In this block the second signal does so."""
+        self._patience = 1
+        try:
+            yield
+        finally:
+            self._patience = math.inf
+
+    def interrupt(self, error: BaseException) -> bool:
+        """Raise an error in the main thread, from another, if the loop runs there; whether it does."""
+        if not self._before or not hasattr(signal, "pthread_kill"):
+            return False
+        self._error = error
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+        return True
+
     def _keep(self) -> None:
         self._number, self._hearing = int(NOTED[0]), False
 
     def _hear_main(self) -> Any:
         """Begin in the main thread; returns what ends it."""
-        found = {number: signal.getsignal(number) for number in (*_numbers(ALWAYS), *_numbers(UNLESS_USED))}
+        found = {number: signal.getsignal(number) for number in (*_numbers(ALWAYS), *_unless_used())}
         always = _numbers(ALWAYS)
         self._before = {
             # None is a handler that was not set from Python, and could not be restored.
             n: old
             for n, old in found.items()
-            if old is not None and (n in always or old is signal.SIG_DFL)
+            if old is not None and (n in always or (old is signal.SIG_DFL and not _used_by_code(n)))
         }
         for number in self._before:
             signal.signal(number, self._note)
@@ -98,7 +140,15 @@ class Signals:
                 _take()  # from what was just restored
 
     def _note(self, number: int, frame: Any) -> None:
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise error
         NOTED[0] = number
+        if number in _numbers(TERMINAL):
+            signal.signal(number, signal.SIG_IGN)
+        if self._patience < 1:
+            raise self.error
+        self._patience -= 1
         if self._released:
             signal.signal(number, self._before[number])
             signal.raise_signal(number)
@@ -121,6 +171,8 @@ _loops: set[int] = set()
 _elsewhere: set[int] = set()
 _replaced: dict[int, Any] = {}
 """What the system called before, as its ``struct sigaction``"""
+_quiet: set[int] = set()
+"""Those that are ignored for the rest of the loop"""
 DEFAULT = None
 """SIG_DFL, as ctypes shows a null pointer"""
 
@@ -129,19 +181,41 @@ def _numbers(names: tuple[str, ...]) -> tuple[int, ...]:
     return tuple(int(getattr(signal, name)) for name in names if hasattr(signal, name))
 
 
+def _unless_used() -> tuple[int, ...]:
+    """Signals that are heard where they would end or halt the process; not where the program ignores them (`nohup`)
+    or uses them."""
+    return tuple(
+        sorted(int(n) for n in signal.valid_signals() if n not in (*_numbers(ALWAYS), *_numbers(NEVER)))
+    )
+
+
+def name_of(number: int) -> str:
+    """A signal's name; signals for real time are counted from the first."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"SIGRTMIN+{number - int(signal.SIGRTMIN)}"
+
+
 @functools.cache
-def _system() -> tuple[Any, Any]:
-    """The C library, and the compiled handler."""
+def _library() -> Any:
+    """The C library."""
     library: Any = ctypes.CDLL(None)
     library.signal.argtypes, library.signal.restype = [ctypes.c_int, ctypes.c_void_p], ctypes.c_void_p
     library.sigaction.argtypes = [ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
-    return library, compiled_notice(NOTED)
+    return library
+
+
+@functools.cache
+def _notice() -> Any:
+    """The compiled handler."""
+    return compiled_notice(NOTED)
 
 
 def _take() -> None:
     """Have the system call the compiled handler."""
-    library, notice = _system()
-    for number in (*_numbers(ALWAYS), *_numbers(UNLESS_USED)):
+    library, notice = _library(), _notice()
+    for number in (*_numbers(ALWAYS), *_unless_used()):
         old = _action(number)
         if _handler(old) == notice.address or (
             number not in _numbers(ALWAYS) and _handler(old) is not DEFAULT
@@ -160,20 +234,30 @@ def _end_elsewhere(heard: Signals) -> None:
         _loops.discard(id(heard))
         if _elsewhere:
             return
-        library, notice = _system()
+        library, notice = _library(), _notice()
         for number, old in _replaced.items():
-            if _handler(_action(number)) == notice.address:  # else the program has set its own meanwhile
+            # Another handler is one that the program has set meanwhile.
+            if _handler(_action(number)) == notice.address or number in _quiet:
                 library.sigaction(number, old, None)
         _replaced.clear()
+        _quiet.clear()
         came = int(NOTED[0])
     if came:
         os.kill(os.getpid(), came)
 
 
+def _used_by_code(number: int) -> bool:
+    """Whether compiled code hears a signal (`faulthandler` some of them), of which Python knows nothing."""
+    if os.name != "posix":
+        return False
+    handler = _handler(_action(number))
+    return handler is not DEFAULT and not (_elsewhere and handler == _notice().address)
+
+
 def _action(number: int) -> Any:
     """What the system does at a signal: its ``struct sigaction``, whose first member is the handler."""
     found = ctypes.create_string_buffer(256)
-    _system()[0].sigaction(number, None, found)
+    _library().sigaction(number, None, found)
     return found
 
 

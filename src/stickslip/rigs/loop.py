@@ -12,25 +12,27 @@ from __future__ import annotations
 
 import math
 import os
+import sys
+import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import Any, TypeVar, cast
 
 import numpy as np
 
 from stickslip.control.controller import Controller
-from stickslip.errors import InputError, RigError
+from stickslip.errors import InputError, MessageLost, Overrun, RigError
 from stickslip.record import Record
-from stickslip.rigs.budget import BUDGET, Budget
-from stickslip.rigs.declared import FIELDS, answer, blamed, checked
-from stickslip.rigs.guard import Guard
+from stickslip.rigs.budget import BUDGET, Budget, Watch
+from stickslip.rigs.declared import FIELDS, answer, blamed, checked, last_resort
+from stickslip.rigs.guard import Guard, clock_fault
 from stickslip.rigs.interrupts import Signals
 from stickslip.rigs.loop_sample import COLUMNS, UNITS, Control, control_of
 from stickslip.rigs.realtime import TIMES, Account, Pace, soft_real_time
 from stickslip.rigs.rig import BlockRig, Limits, Measurement, Rig, Setpoint, insist_on_setpoints, setpoints
-from stickslip.rigs.safety import STOPPED, STOPPING
+from stickslip.rigs.safety import RATE, STOPPED, STOPPING
 from stickslip.rigs.step import Step
 from stickslip.stream import Stream
 
@@ -39,7 +41,9 @@ Result = TypeVar("Result")
 PythonController = Callable[[Measurement, Setpoint], float]
 """A controller in Python: the torque from what is measured and the setpoint, N·m. It runs sample by sample."""
 
-TORQUE = Setpoint._fields.index("torque")
+TORQUE, TIME = Setpoint._fields.index("torque"), Measurement._fields.index("time")
+CLOSING, ABANDONED = 10.0, 1.0
+"""s that a rig may take to close: at the end, and from another thread while its exchange does not return"""
 BLOCK = 50
 """Samples of one compiled block: a signal is heard, and rows are committed, at least that often"""
 
@@ -105,6 +109,9 @@ class Loop:
         self._scratch = np.zeros(len(COLUMNS))
         self._setpoint = np.zeros(len(Setpoint._fields))
         self._step = Step(self._guard.control)
+        self._watch = Watch()
+        self._exchange: Callable[[float], Any] = self.rig.exchange
+        self._answered = True
 
     # ---- arming and disarming ------------------------------------------------------------------------------
 
@@ -119,14 +126,23 @@ class Loop:
                 UNITS, self._path, self._described(), self._absent(), paced=self.realtime, batch=BLOCK
             )
             undo.callback(self._end_record)
+            self._watch = Watch()
+            undo.enter_context(self._watch.running())
             undo.callback(self._disarm)
-            self._guard.control.measured[:] = answer(self.rig, "open", self.rig.open)
+            if self.realtime and math.isfinite(self.limits.answer_time):
+                self._exchange = self._watched(undo)
+            with self._signals.at_once():
+                self._guard.control.measured[:] = answer(self.rig, "open", self.rig.open)
             self._undo = undo.pop_all()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
         with self._undo:
-            self._ramp_down()
+            self._guard.at_last(error)
+            try:
+                self._ramp_down()
+            except (RigError, InputError):
+                self._guard.leave_untold()
             self._hear()  # a signal that came between two runs
         self._hear()  # or while the record was closed
         if kind is None and (fault := self._guard.untold) is not None:
@@ -137,11 +153,59 @@ class Loop:
             self._guard.fault = self._signals.error
 
     def _disarm(self) -> None:
+        budget = Budget(0.0, CLOSING, self._unclosed, self._abandon)
         try:
-            with blamed(self.rig, "close"):
-                self.rig.close()
+            with self._watch.over(budget), self._signals.at_the_second(), blamed(self.rig, "close"):
+                budget.call(self.rig.close)
         except (RigError, InputError) as error:
             self._guard.at_last(error)
+
+    def _unclosed(self, took: float) -> RigError:
+        return MessageLost(
+            f"{self.rig.name}: close has not returned for {took:.3g} s; its torque command was zero, and "
+            f"{last_resort(self.rig)}"
+        )
+
+    def _watched(self, undo: ExitStack) -> Callable[[float], Any]:
+        """`Rig.exchange`, watched."""
+        budget = Budget(
+            (1.0 + RATE) * self.rig.sample_time, self.limits.answer_time, self._unanswered, self._give_up,
+            lenient=not self.rig.capabilities.real_clock,
+        )  # fmt: skip
+        undo.enter_context(self._watch.over(budget))
+        return lambda torque: budget.call(self.rig.exchange, torque)
+
+    def _unanswered(self, took: float) -> RigError:
+        return MessageLost(
+            f"{self.rig.name}: exchange took {1e3 * took:.3g} ms in a sample of {1e3 * self.rig.sample_time:.3g} ms, "
+            f"at a command of {self._guard.torque:.4g} N·m, and is more than its answer_time of "
+            f"{1e3 * self.limits.answer_time:.3g} ms behind the clock; check the connection, or set a greater "
+            "answer_time in [rig.limits]"
+        )
+
+    def _give_up(self, error: RigError) -> None:
+        """Close the rig while its exchange does not return: no ramp can pass through it."""
+        self._guard.ask(error)
+        self._guard.cut()
+        closing = threading.Thread(target=self._close_quietly, name="close", daemon=True)
+        closing.start()
+        closing.join(ABANDONED)
+        closed = "the rig was closed meanwhile" + (
+            ", but close has not returned either" if closing.is_alive() else ""
+        )
+        error.args = (f"{error}; {closed}; if its torque still acts, {last_resort(self.rig)}",)
+        self._answered = True  # reported
+        self._abandon(error)
+
+    def _close_quietly(self) -> None:
+        with suppress(Exception):  # closed once more at the end, where what it raises is reported
+            self.rig.close()
+
+    def _abandon(self, error: RigError) -> None:
+        """Leave a call of the rig that does not return; where that is impossible, report it."""
+        self._signals.release()
+        if not self._signals.interrupt(error):
+            print(f"stickslip: {error}", file=sys.stderr, flush=True)
 
     def _described(self) -> dict[str, Any]:
         plain = self.limits.plain()
@@ -214,7 +278,7 @@ class Loop:
         if self._guard.state == STOPPING:
             self._ramp(stream)
         if self._guard.state == STOPPED:
-            raise self._guard.error(self.rig.name, self.limits, stream)
+            raise self._error(stream)
         return stream.rows(begin, stream.count)
 
     def pause(self, seconds: float) -> Measurement:
@@ -224,7 +288,15 @@ class Loop:
         if self.rig.capabilities.real_clock:
             self._rest(seconds)
         else:
-            self._guard.control.measured[:] = answer(self.rig, "pause", lambda: self.rig.pause(seconds))
+            measured = self._guard.control.measured
+            before = float(measured[TIME])
+            with self._signals.at_once():
+                measured[:] = answer(self.rig, "pause", lambda: self.rig.pause(seconds))
+            if not measured[TIME] >= before:
+                measured[TIME], after = before, float(measured[TIME])
+                self._guard.ask(clock_fault(self.rig.name, after - before, "during a pause"))
+                self._guard.cut()
+                raise self._error(self._open_stream())
             self._guard.forget_speed()
         return Measurement(*self._guard.control.measured)
 
@@ -259,7 +331,7 @@ class Loop:
         self._pace.restart()
         self._by_samples(None, setpoints(count), None)
         if self._guard.state == STOPPED:
-            raise self._guard.error(self.rig.name, self.limits, self._open_stream())
+            raise self._error(self._open_stream())
 
     def _open_stream(self) -> Stream:
         if self._stream is None:
@@ -302,9 +374,16 @@ class Loop:
             self._ramp(stream)
             self._signals.release()
 
-        rests = self._guard.torque == 0.0
-        budget = Budget(self.rig.sample_time, self._budget, take_over, rests=rests)
-        undo.enter_context(budget.watched())
+        period = self.rig.sample_time
+
+        def overrun(took: float) -> Overrun:
+            return Overrun(
+                f"the controller took {1e3 * took:.3g} ms in a sample of {1e3 * period:.3g} ms and is more than its "
+                f"budget of {1e3 * self._budget:.3g} ms behind the clock; make it faster, or give Loop a greater budget"
+            )
+
+        budget = Budget(period, self._budget, overrun, take_over, lenient=self._guard.torque == 0.0)
+        undo.enter_context(self._watch.over(budget))
         return lambda measured, setpoint: budget.call(python, measured, setpoint)
 
     def _sample(self, stream: Stream | None, setpoint: int, times: Any) -> None:
@@ -312,6 +391,7 @@ class Loop:
         begin = time.perf_counter_ns()
         row = self._row(stream)
         if self._signals.number:
+            self._signals.quieten()
             self._guard.ask(self._signals.error)
         before = time.thread_time_ns()
         torque = self._step.decide(setpoint, row)
@@ -329,11 +409,13 @@ class Loop:
             times[0] = self._pace.wait(self._step.rehearse)
         measured = self._guard.control.measured
         try:
-            found: object = cast(object, self.rig.exchange(torque))
+            self._answered = False
+            found: object = cast(object, self._exchange(torque))
             # One number would be taken for all.
             if not isinstance(found, tuple) or len(found) != FIELDS:  # type: ignore[reportUnknownArgumentType]
                 raise RigError(f"{self.rig.name}: exchange gave {found!r}; it must give a Measurement")
             measured[:] = found
+            self._answered = True
         except BaseException as error:  # whatever it is: the torque goes to zero first
             self._guard.pass_time(self.rig.sample_time)
             self._guard.ask(error)
@@ -373,6 +455,7 @@ class Loop:
             stream.commit(count)
             done += count
         if self._signals.number:
+            self._signals.quieten()
             self._guard.ask(self._signals.error)
         if stream.fault is not None:
             self._guard.ask(stream.fault)
@@ -392,4 +475,16 @@ class Loop:
             return
         if self._guard.begin_ramp():
             self._ramp(self._stream)
-        self._guard.end_ramp()
+        if not self._guard.end_ramp():
+            raise self._error(self._open_stream())
+
+    def _error(self, stream: Stream) -> BaseException:
+        """What is raised once the torque is zero, as far as the rig has taken that."""
+        error = self._guard.error(self.rig.name, self.limits, stream)
+        if not self._answered and isinstance(error, RigError):
+            self._answered = True  # reported
+            error.args = (
+                f"{error}; the rig has not answered the command of 0 N·m: if its torque still acts, "
+                f"{last_resort(self.rig)}",
+            )
+        return error

@@ -174,7 +174,7 @@ def step(at: Sample) -> float:
         record_at(at.safety, SAFETY),
     )
     row = record_at(at.row, ROW)
-    row.time, row.position, row.velocity, row.motor_torque = y.time, y.position, s.velocity, y.torque
+    row.time, row.position, row.velocity, row.motor_torque = s.time, y.position, s.velocity, y.torque
     row.torque_command, row.sensor_torque, row.temperature = torque, y.sensor, y.temperature
     row.position_reference, row.velocity_reference, row.torque_setpoint = w.position, w.velocity, w.torque
     row.compensation_torque, row.closed = record_at(at.memory, REMEMBERED).others, w.closed

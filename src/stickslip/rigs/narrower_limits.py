@@ -16,6 +16,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LIMITS = (
     "torque", "speed", "lowest_position", "highest_position", "temperature", "following_error", "stop_time",
+    "answer_time", "standstill_torque",
 )  # fmt: skip
 """Names of the limits, as in a rig's file"""
 

@@ -6,6 +6,7 @@ What the loop, its limits or a controller would have made of a run is so asked o
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -58,7 +59,8 @@ class Replay:
         record["position"]  # raises where there is none
         insist_on_order(record.time)
         self.sample_time = usable(sample_time_of(record) if sample_time is None else sample_time)
-        self.limits = limits or UNLIMITED
+        # It answers neither the torque nor the clock of whoever asks.
+        self.limits = replace(limits or UNLIMITED, answer_time=math.inf, standstill_torque=math.inf)
         self.capabilities = Capabilities(
             Watchdog(0.0, "nothing moves"),
             real_clock=False,

@@ -32,19 +32,21 @@ LIMIT_UNITS = {
     "position": "rad", "speed": "rad/s", "torque": "N·m", "temperature": "°C", "following error": "rad",
 }  # fmt: skip
 """Limits by their names in messages"""
+STANDSTILL = 0.8
+"""Of the torque limit: the largest break-away torque that the stages of a commissioning can exceed by a quarter"""
 
 
 class Measurement(NamedTuple):
     """What a rig measured at the end of a sample; NaN where it has no such sensor."""
 
     time: float
-    """s, of the rig's own clock, ascending"""
+    """s, of the rig's own clock, increasing by a sample time from one sample to the next"""
     position: float
     """rad"""
     torque: float
     """Motor torque, N·m: measured current times the torque constant"""
     sensor: float = math.nan
-    """Torque sensor, N·m"""
+    """Torque sensor, N·m; positive where the motor's torque is"""
     temperature: float = math.nan
     """Degrees Celsius"""
     status: float = 0.0
@@ -128,6 +130,13 @@ class Limits:
     stop_time : float
         The declared time of a stop, s: from the sample that sees the reason until the torque command is zero. The
         torque falls by ``torque / stop_time``, so a smaller torque is gone sooner.
+    answer_time : float
+        How long the rig may be without a plausible answer, s (`stickslip.rigs.safety`): `Rig.exchange` takes longer
+        than a sample, its clock runs at another rate, readings stand still although the torque must change them.
+        Infinite: the rig is not watched.
+    standstill_torque : float
+        Largest torque at which the axis may stand still, N·m: more than its greatest break-away torque. 0 stands for
+        four fifths of ``torque``, as identification needs 1.25 times the break-away torque.
     """
 
     torque: float
@@ -136,6 +145,8 @@ class Limits:
     temperature: float = math.inf
     following_error: float = math.inf
     stop_time: float = 0.02
+    answer_time: float = 0.1
+    standstill_torque: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("torque", "speed", "stop_time"):
@@ -146,6 +157,15 @@ class Limits:
             raise ParameterError(
                 f"limits: following_error = {self.following_error:g} rad must be greater than 0"
             )
+        if not self.answer_time > 0.0:
+            raise ParameterError(f"limits: answer_time = {self.answer_time:g} s must be greater than 0")
+        if not self.standstill_torque >= 0.0:
+            raise ParameterError(
+                f"limits: standstill_torque = {self.standstill_torque:g} N·m must be greater than 0"
+            )
+        if self.standstill_torque == 0.0:
+            # Kept by `dataclasses.replace`: a lower limit on the torque lowers no break-away torque.
+            object.__setattr__(self, "standstill_torque", STANDSTILL * self.torque)
         if not self.position[0] < self.position[1]:
             raise ParameterError(f"limits: position = {self.position} rad must be (lowest, highest)")
         if math.isnan(self.temperature):
@@ -159,7 +179,9 @@ class Limits:
         InputError
             Which limit is, and the value here.
         """
-        for name in ("torque", "speed", "temperature", "following_error", "stop_time"):
+        for name in (
+            "torque", "speed", "temperature", "following_error", "stop_time", "answer_time", "standstill_torque",
+        ):  # fmt: skip
             value, most = getattr(narrower, name), getattr(self, name)
             if value > most:
                 raise InputError(f"limits: {name} = {value:g} is wider than the rig's {most:g}")
@@ -259,7 +281,8 @@ class Rig(Protocol):
         ...
 
     def close(self) -> None:
-        """Disarm and disconnect; it may be called at any time, also twice, and after a failed `open`."""
+        """Take the torque away, disarm and disconnect. It may be called at any time: twice, after a failed `open`, and
+        from another thread while `exchange` does not return."""
         ...
 
 

@@ -1,10 +1,23 @@
-"""The safety of the loop: limits, the reasons to stop, and the stop itself, one sample at a time.
+"""The safety of the loop: limits, what is expected of the rig's answers, and the stop itself, one sample at a time.
 
 `guarded` is one whole sample of the loop: it watches the limits, runs the controller
 (`stickslip.control.composition`), and from the sample that sees a reason to stop on it ramps the torque to zero. It is
 written in the scalar subset (`stickslip.subset`), so that it is the same compiled code in every loop, and plain
 Python in a test. Once the ramp has begun nothing but the number of samples decides the torque: no measurement, no
 setpoint and no controller can prolong it.
+
+What is expected of an answer, all within `stickslip.rigs.rig.Limits.answer_time` (t):
+
+- Its time increases in every sample, by no more than a sample and t, and not for t at a rate that is a quarter off.
+- The position changes within t where a torque stands that must move the axis. At rest an axis bears any torque up to
+  its break-away torque without a reading that changes, if the encoder is coarse; so that torque is a declared one,
+  `stickslip.rigs.rig.Limits.standstill_torque`. Under a torque T beyond the break-away torque F_S the axis would move
+  by (T - F_S) t² / 2 J, which is far more than a count. An axis that was sliding, driven, and stands still from one
+  sample to the next has the torque that it slid under for this one: friction alone stops no inertia within a sample.
+- Not every reading stays as it is for t while the torque command changes by a tenth of its limit, if the measured
+  torque has changed before.
+- The measured torque follows the command: averaged over t they differ by no more than half the command and a
+  twentieth of the limit. The sensor's has its direction while the motor drives the axis.
 
 While the loop is open the laws run, so that an observer knows the disturbance when it is closed.
 
@@ -31,14 +44,22 @@ RUNNING, STOPPING, STOPPED, ENDED = 0.0, 1.0, 2.0, 3.0
 NONE, POSITION, SPEED, TORQUE, TEMPERATURE, FOLLOWING, NOT_FINITE, STATUS, ASKED = (
     0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0,
 )  # fmt: skip
+CLOCK, STILL, FROZEN, IGNORED, OPPOSED = 9.0, 10.0, 11.0, 12.0, 13.0
 REASONS = (
     "none", "position", "speed", "torque", "temperature", "following error", "not a number", "the rig's fault",
-    "asked",
+    "asked", "clock", "standstill", "frozen", "torque ignored", "sensor",
 )  # fmt: skip
 """Words for the channel ``reason`` of a record."""
 
 MEASURED = 1.25  # of the largest command, that a measured torque may reach: overshoot and noise
 UNBOUNDED = 1e300  # stands for no bound
+
+# What is expected of the rig's answers; the module says why.
+RATE = 0.25  # of the sample time, by which the clock's steps may be off for long
+SLID, SLIDING = 10.0, 0.05  # samples in a row, and of the speed limit: the axis slides
+CHANGED = 0.1  # of the torque limit: a command that has changed, or is large enough to be compared
+UNLIKE, OFFSET = 0.5, 0.05  # of the command, and of the torque limit: a measured torque that does not follow
+SENSED = 5.0  # of the answer time, for which a sensor may read against the motor: springs and inertia swing
 
 
 class Bounds(NamedTuple):
@@ -53,6 +74,8 @@ class Bounds(NamedTuple):
     fall: Annotated[float, Par("N·m", "", "by which the torque falls in a sample of the stop")]
     travel: Annotated[float, Par("rad", "", "displacement that ends a segment")]
     sample_time: Annotated[float, Par("s", "T", "sample time")]
+    answer: Annotated[float, Par("s", "", "time without a plausible answer")]
+    standstill: Annotated[float, Par("N·m", "", "largest torque at which the axis may stand still")]
 
 
 class Safety(NamedTuple):
@@ -66,6 +89,26 @@ class Safety(NamedTuple):
     velocity: Annotated[float, Par("rad/s", "", "difference of the positions over the sample time")]
     origin: Annotated[float, Par("rad", "", "position at the start of the segment")]
     value: Annotated[float, Par("-", "", "the value that crossed its limit")]
+    time: Annotated[float, Par("s", "", "the rig's time one sample ago, as it is recorded")]
+    begun: Annotated[
+        float, Par("-", "", "samples of the segment; others may have passed before its second answer")
+    ]
+    astray: Annotated[float, Par("s", "", "for how long the clock has run at another rate")]
+    driven: Annotated[float, Par("-", "", "samples in a row in which the motor drove a sliding axis")]
+    push: Annotated[float, Par("N·m", "", "largest torque of these samples")]
+    moving: Annotated[float, Par("N·m", "", "torque that must move the axis, which stands still")]
+    still: Annotated[float, Par("s", "", "for how long it stands still under such a torque, with its sign")]
+    motor: Annotated[float, Par("N·m", "", "measured torque one sample ago")]
+    sensor: Annotated[float, Par("N·m", "", "torque sensor one sample ago")]
+    warmth: Annotated[float, Par("°C", "", "temperature one sample ago")]
+    alive: Annotated[float, Par("-", "", "1 once the measured torque has changed")]
+    same: Annotated[float, Par("s", "", "for how long every reading has been the same")]
+    least: Annotated[float, Par("N·m", "", "smallest command of that time")]
+    most: Annotated[float, Par("N·m", "", "largest command of that time")]
+    commanded: Annotated[float, Par("N·m", "", "mean command")]
+    answered: Annotated[float, Par("N·m", "", "mean measured torque")]
+    unlike: Annotated[float, Par("s", "", "for how long these have differed")]
+    opposed: Annotated[float, Par("s", "", "for how long the sensor has read against the motor")]
 
 
 def bounds(limits: Limits, sample_time: float, travel: float = math.inf) -> Bounds:
@@ -82,12 +125,14 @@ def bounds(limits: Limits, sample_time: float, travel: float = math.inf) -> Boun
         limits.torque / steps,
         min(travel, UNBOUNDED),
         sample_time,
+        min(limits.answer_time, UNBOUNDED),
+        min(limits.standstill_torque, UNBOUNDED),
     )
 
 
 def stop(reason: float, value: float, s: Any) -> None:
-    """Begin to stop; the first reason is kept."""
-    if s.state == RUNNING or s.state == ENDED:
+    """Begin to stop; the first reason is kept. A ramp between two segments has none until something is wrong."""
+    if s.state != STOPPED and s.reason == NONE:
         s.state = STOPPING
         s.reason = reason
         s.value = value
@@ -98,12 +143,10 @@ def watch_motion(y: Any, w: Any, b: Any, s: Any) -> None:
     if not abs(y.position) < UNBOUNDED:
         stop(NOT_FINITE, y.position, s)
         return
-    if s.started == 0.0:
-        s.started = 1.0
-        s.origin = y.position
-        s.position = y.position
     s.velocity = (y.position - s.position) / b.sample_time
-    s.position = y.position
+    if s.started == 0.0:
+        s.origin = y.position
+        s.velocity = 0.0
     if y.position < b.low or y.position > b.high:
         stop(POSITION, y.position, s)
     if abs(s.velocity) > b.speed:
@@ -123,6 +166,123 @@ def watch_state(y: Any, b: Any, s: Any) -> None:
     # Where a temperature is limited, one that cannot be read is too high.
     if b.temperature < UNBOUNDED and not y.temperature <= b.temperature:
         stop(TEMPERATURE, y.temperature, s)
+
+
+def watch_clock(y: Any, b: Any, s: Any) -> None:
+    """The rig's time advances, sample by sample."""
+    step = y.time - s.time
+    s.begun += 1.0
+    if not step > 0.0 or (step > b.sample_time + b.answer and s.begun > 2.0):
+        stop(CLOCK, step, s)
+    elif abs(step - b.sample_time) <= RATE * b.sample_time:
+        s.astray = 0.0
+    else:
+        s.astray += b.sample_time
+        if s.astray > b.answer:
+            stop(CLOCK, step, s)
+
+
+def watch_standstill(y: Any, b: Any, s: Any) -> None:
+    """The position changes under a torque that must move the axis."""
+    if y.position != s.position:
+        s.still = 0.0
+        s.moving = b.standstill
+        if s.torque * s.velocity > 0.0 and abs(s.velocity) > SLIDING * b.speed:
+            s.driven += 1.0
+            s.push = max(s.push, abs(s.torque))
+        else:
+            s.driven = 0.0
+            s.push = 0.0
+        return
+    if s.driven >= SLID:
+        s.moving = min(s.push, b.standstill)
+    s.driven = 0.0
+    s.push = 0.0
+    if abs(s.torque) < s.moving:
+        s.still = 0.0
+    elif s.torque * s.still < 0.0:
+        s.still = math.copysign(b.sample_time, s.torque)
+    else:
+        s.still += math.copysign(b.sample_time, s.torque)
+    if abs(s.still) > b.answer:
+        stop(STILL, s.torque, s)
+
+
+def differ(a: float, b: float) -> bool:
+    """Whether two readings differ; a sensor that the rig lacks reads NaN."""
+    return a != b and (a == a or b == b)
+
+
+def watch_readings(y: Any, b: Any, s: Any) -> None:
+    """Some reading changes while the command does."""
+    if differ(y.torque, s.motor):
+        s.alive = 1.0
+    if (
+        y.position != s.position or differ(y.torque, s.motor) or differ(y.sensor, s.sensor)
+        or differ(y.temperature, s.warmth)
+    ):  # fmt: skip
+        s.same = 0.0
+        s.least = s.torque
+        s.most = s.torque
+        return
+    s.same += b.sample_time
+    s.least = min(s.least, s.torque)
+    s.most = max(s.most, s.torque)
+    if s.same > b.answer and s.alive != 0.0 and s.most - s.least > CHANGED * b.torque:
+        stop(FROZEN, s.same, s)
+
+
+def watch_torque(y: Any, b: Any, s: Any) -> None:
+    """The measured torque follows the command, and the sensor has its direction where the motor drives the axis."""
+    part = min(1.0, b.sample_time / b.answer)
+    s.commanded += part * (s.torque - s.commanded)
+    if abs(y.torque) < UNBOUNDED:
+        s.answered += part * (y.torque - s.answered)
+        command = abs(s.commanded)
+        if (
+            command > CHANGED * b.torque
+            and abs(s.answered - s.commanded) > UNLIKE * command + OFFSET * b.torque
+        ):
+            s.unlike += b.sample_time
+        else:
+            s.unlike = 0.0
+        if s.unlike > b.answer:
+            stop(IGNORED, s.answered, s)
+    if s.torque * s.velocity > 0.0 and abs(y.sensor) > CHANGED * b.torque:
+        if y.sensor * s.torque > 0.0:
+            s.opposed = 0.0
+        else:
+            s.opposed += b.sample_time
+            if s.opposed > SENSED * b.answer:
+                stop(OPPOSED, y.sensor, s)
+
+
+def watch_answer(y: Any, b: Any, s: Any) -> None:
+    """What is expected of the rig's answer to the last command."""
+    known = abs(y.position) < UNBOUNDED
+    watched = b.answer < UNBOUNDED
+    if s.started == 0.0:
+        s.moving = b.standstill
+        s.driven = 0.0
+        s.push = 0.0
+        s.still = 0.0
+        s.same = 0.0
+        s.astray = 0.0
+        s.least = s.torque
+        s.most = s.torque
+    elif watched and known:
+        watch_clock(y, b, s)
+        watch_standstill(y, b, s)
+        watch_readings(y, b, s)
+        watch_torque(y, b, s)
+    # The times of a record increase, also after a clock that does not has become a reason to stop.
+    s.time = s.time + b.sample_time if watched and s.started != 0.0 and not y.time > s.time else y.time
+    s.started = 1.0
+    s.motor = y.torque
+    s.sensor = y.sensor
+    s.warmth = y.temperature
+    if known:
+        s.position = y.position
 
 
 def idle(y: Any, w: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
@@ -157,6 +317,7 @@ def guarded(y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: A
     """One sample of the loop: watch, control, and stop if there is reason to. Returns the torque command, N·m."""
     watch_motion(y, w, b, s)
     watch_state(y, b, s)
+    watch_answer(y, b, s)
     if s.state == RUNNING:
         torque = control(y, w, s, n, m, z, p, u)
         if m.fault != 0.0:

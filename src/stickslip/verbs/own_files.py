@@ -48,6 +48,11 @@ def ours(path: Path) -> bool:
     return _ledger(path.parent).get(path.name) == _hash(path)
 
 
+def listed(path: Path) -> bool:
+    """Whether stickslip wrote a file of that name in this folder, edited since or not."""
+    return path.name in _ledger(path.parent)
+
+
 def written(paths: Iterable[Path]) -> None:
     """Note that these files are stickslip's own, as they are now."""
     folders: dict[Path, dict[str, str]] = {}

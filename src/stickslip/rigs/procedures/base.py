@@ -343,22 +343,27 @@ def _run(
     kept: list[tuple[str, Array]] = []
     steps = procedure.steps(rig)
     paced = rig.capabilities.real_clock or bool(realtime)
-    loop: Loop | None = None
+    account: Account | None = None
+    step = next(steps, None)
+    # With nothing written, the loop is begun anew after a pause, and what was not kept is forgotten.
+    single = path is not None or paced
+    while step is not None:
+        with Loop(rig, path=path, meta=meta, without_watchdog=without_watchdog, realtime=realtime) as loop:
+            while step is not None:
+                step = _next(steps, _one(loop, step, kept, meta, progress))
+                if not single and step is not None and step.pause > 0.0:
+                    break
+        account = loop.account()
+    return kept, account if paced else None
+
+
+def _next(steps: Steps, rows: Array) -> Step | None:
+    """The step after one that recorded these rows; None at the end: no exception, since that would leave the loop as
+    one that failed, which hides what the rig raises when it is closed."""
     try:
-        step = next(steps)
-        # With nothing written, the loop is begun anew after a pause, and what was not kept is forgotten.
-        single = path is not None or paced
-        while True:
-            with Loop(
-                rig, path=path, meta=meta, without_watchdog=without_watchdog, realtime=realtime
-            ) as loop:
-                while True:
-                    rows = _one(loop, step, kept, meta, progress)
-                    step = steps.send(rows)
-                    if not single and step.pause > 0.0:
-                        break
+        return steps.send(rows)
     except StopIteration:
-        return kept, loop.account() if loop is not None and paced else None
+        return None
 
 
 def _one(loop: Loop, step: Step, kept: list[tuple[str, Array]], meta: Any, progress: Any) -> Array:
