@@ -121,6 +121,8 @@ def _argument(found: re.Match[str], function: str) -> str:
     name = NAMES.get(option, option.replace("-", "_"))
     if option == "to" and function != "export":
         name = "end"
+    if option == "set":
+        name = "settings" if function == "export" else "values"
     if not value:
         return (
             f"{name}=True"

@@ -55,7 +55,7 @@ def bounded_verdicts(
     """The estimates, those refused that only such a bound, named by `what`, limits."""
     out: list[Estimate] = []
     for e in estimates:
-        least, most = limits.get(e.name, (0.0, np.inf))
+        least, most = limits.get(e.name, (-np.inf, np.inf))
         above = e.upper >= most * (1.0 - 1e-6)
         bound = e.identified and (above or e.lower <= least * (1.0 + 1e-6))
         side, edge = ("above", most) if above else ("below", least)

@@ -19,8 +19,8 @@ from stickslip.identify.doctor import Diagnosis
 from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.experiment import DRIVES
 from stickslip.identify.held import held_in
-from stickslip.identify.methods import method_named
-from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.methods import method_named, methods_by_option
+from stickslip.identify.methods.method import Method, Options, given_in
 from stickslip.identify.on_a_line import along_a_line, worded
 from stickslip.identify.regression.regressions import Regressions
 from stickslip.model import Model
@@ -154,7 +154,6 @@ def identify(
         One line that names the thing, its value and the remedy; an error of the doctor, too.
     """
     kind = method_named(method)
-    refused_for(method, kind.holds_out, threshold, bool(_listed(hold_out)), position_map)
     regress = Regressions()
     laws, left_out = laws_of(law)
     known = dict(values or {}) | ({} if inertia is None else {"inertia": inertia})
@@ -165,6 +164,8 @@ def identify(
         loop_output, extra_torque, torque_is, delay, harmonics, load, intervals, robust, regress, progress,
         position_map, reading.get("force_constant"),
     )  # fmt: skip
+    given = given_in(options, inertia=inertia is not None, loop=bool(loop), hold_out=bool(_listed(hold_out)))
+    kind.refuse_unused(given, methods_by_option())
     examiner = Examiner((*accept, *(["missing-column"] if kind.takes_current else [])), regress, tell)
     sources = sources_of(logs, _listed(hold_out), loop, reading, examiner)
     if pendulum:
@@ -175,6 +176,7 @@ def identify(
         kind = method_named("hysteresis")
         why = "the friction itself is recorded, and no torque of a drive"
         tell(f"{why}: --method hysteresis is taken, a law along the motion")
+        kind.refuse_unused(given, methods_by_option())
     kind.refuse_unknown(options)
     kind.check(records, options)
     examiner.warn(sources)
@@ -223,16 +225,6 @@ def with_notes(
     )
     held = held_in(found, options.frozen, options.values)
     return replace(found, notes=(*found.notes, *said), held=held)
-
-
-def refused_for(method: str, holds_out: bool, threshold: float | None, hold_out: bool, over: bool) -> None:
-    """Refuse what the method would not look at."""
-    if threshold is not None and method != "breakaway":
-        raise InputError(f"--threshold is for --method breakaway; --method {method} has none")
-    if over and method != "axis":
-        raise InputError(f"--position is for --method axis; --method {method} has none")
-    if hold_out and not holds_out:
-        raise InputError(f"--hold-out is for --method axis; --method {method} has none")
 
 
 def laws_of(law: str | Law | Sequence[str | Law] | None) -> tuple[tuple[str | Law, ...], list[str]]:

@@ -11,8 +11,8 @@ import numpy as np
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.estimate import Identification
 from stickslip.identify.fit.axis_start import each_way, frozen_by_default, starts
-from stickslip.identify.methods._records import has_torque, torque_channel
-from stickslip.identify.methods.method import Method, Options, law_of, refuse_unsaid
+from stickslip.identify.methods._records import has_torque, with_torque
+from stickslip.identify.methods.method import TORQUE, Method, Options, law_of, refuse_unsaid
 from stickslip.identify.sliding.choice import candidates, choose_sliding, comparable
 from stickslip.identify.sliding.curve import Array, identify_sliding
 from stickslip.identify.sliding.points import SlidingPoints
@@ -22,16 +22,15 @@ from stickslip.record import Record
 from stickslip.spec import Law
 
 FEW = "Coulomb with viscous friction was fitted: these points are too few to choose among several curves."
-PER_DIRECTION = (
-    "Friction of each direction includes any constant torque: --per-direction holds offset at 0, since both look alike."
-)
+PER_DIRECTION = "Friction of each direction includes any constant torque: --per-direction holds offset at 0."
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """Fit the laws named, or the curves of the thesis, together with a constant torque; choose one of several."""
     if options.per_direction and not options.laws:
         raise InputError("--method sliding --per-direction needs a law; name one, such as --law coulomb")
-    measured, notes = sliding_points(records, torque=torque_channel(records, options, "sliding"))
+    records, channel = with_torque(records, options, "sliding")
+    measured, notes = sliding_points(records, torque=channel)
     points = replace(measured, offset=known_offset(measured, options))
     if options.laws:
         laws = [law_of(given) for given in options.laws]
@@ -99,4 +98,7 @@ def template(law: Law, velocity: Array, torque: Array, options: Options) -> Mode
     return starts(law, float(np.median(np.abs(torque))), 0.0, speed, 1.0, known)[0]
 
 
-METHOD = Method("sliding", "sliding curve from constant velocities", identify, has_torque("sliding"))
+METHOD = Method(
+    "sliding", "sliding curve from constant velocities", identify, has_torque("sliding"),
+    uses=TORQUE | {"laws", "values", "frozen", "free", "noise", "per_direction"},
+)  # fmt: skip
