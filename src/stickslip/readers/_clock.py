@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -40,8 +40,14 @@ RATES = (
 
 COUNTERS, NEAR = (16, 24, 32), 4.0
 """Bits of a counter of times, and steps by which it may miss the place where it would go on."""
+EFFORTS = {"motor_torque", "friction_torque", "sensor_torque", "current"}
+"""Channels that tell the torque at a constant velocity."""
 SAME = 0.01
 """Part of a stated period by which a column of times may differ from it without a word."""
+
+
+class NoTimes(InputError):
+    """A table whose rows have no times."""
 
 
 def time_of(
@@ -99,10 +105,16 @@ def time_of(
             f"no column is known to be a channel among {_some(table)}; say which is which, "
             "such as --map time=COLUMN:s --map position=COLUMN:deg"
         )
-    raise InputError(
+    steady = "; a table of constant velocities and their torques is for --method sliding"
+    raise NoTimes(
         f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give "
-        f"{_by_header(table)}"
+        f"{_by_header(table)}{steady if may_be_steady(by_role) else ''}"
     )
+
+
+def may_be_steady(by_role: Mapping[str, Choice]) -> bool:
+    """Whether rows without times may be steady points: they have a velocity and an effort, and no position."""
+    return "velocity" in by_role and "position" not in by_role and bool(by_role.keys() & EFFORTS)
 
 
 def _by_header(table: Table) -> str:

@@ -16,6 +16,7 @@ from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import Diagnosis
+from stickslip.identify.doctor.steady_table import is_steady_table
 from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.experiment import DRIVES
 from stickslip.identify.held import held_in
@@ -167,7 +168,7 @@ def identify(
     given = given_in(options, inertia=inertia is not None, loop=bool(loop), hold_out=bool(_listed(hold_out)))
     kind.refuse_unused(given, methods_by_option())
     examiner = Examiner((*accept, *(["missing-column"] if kind.takes_current else [])), regress, tell)
-    sources = sources_of(logs, _listed(hold_out), loop, reading, examiner)
+    sources = sources_of(logs, _listed(hold_out), loop, reading, examiner, steady=kind.takes_steady_points)
     if pendulum:
         sources = [replace(s, findings=with_pendulum(s)) for s in sources]
     records = [s.record for s in sources]
@@ -214,7 +215,7 @@ def with_notes(
     found: Identification, kind: Method, records: Sequence[Record], options: Options, more: Sequence[str]
 ) -> Identification:
     """What was found in the units of the records, with what a reader must know of it."""
-    if all(r.units.get("position") == "m" for r in records):
+    if all(is_linear(r) for r in records):
         # Those two know their axis: their numbers have its units.
         found = worded(found) if kind.name in ("axis", "inertia") else along_a_line(found)
     said = (
@@ -225,6 +226,11 @@ def with_notes(
     )
     held = held_in(found, options.frozen, options.values)
     return replace(found, notes=(*found.notes, *said), held=held)
+
+
+def is_linear(record: Record) -> bool:
+    """Whether the record is of an axis that moves along a line."""
+    return "m" in (record.units.get("position"), record.units.get("velocity", "").removesuffix("/s"))
 
 
 def laws_of(law: str | Law | Sequence[str | Law] | None) -> tuple[tuple[str | Law, ...], list[str]]:
@@ -243,8 +249,9 @@ def laws_of(law: str | Law | Sequence[str | Law] | None) -> tuple[tuple[str | La
 
 
 def sources_of(
-    logs: Sequence[Log], held_out: Sequence[Log], loop: Loops, reading: Reading, examiner: Examiner
-) -> list[Source]:
+    logs: Sequence[Log], held_out: Sequence[Log], loop: Loops, reading: Reading, examiner: Examiner, *,
+    steady: bool = False,
+) -> list[Source]:  # fmt: skip
     """Every log read, looked at by the doctor, with its loop."""
     given: list[Log | None] = [*(logs or [None]), *held_out]
     fitted = len(given) - len(held_out)
@@ -259,7 +266,7 @@ def sources_of(
             return examiner.pieces(record, log)
 
         try:
-            opened = open_log(log, own, doctor)
+            opened = open_log(log, own, doctor, steady=steady)
         except InputError as error:
             if number < fitted:
                 raise
@@ -271,7 +278,13 @@ def sources_of(
             ends = [file_rows(d.record)[[0, -1]] for d in every]
             names = [f"{short} rows {first}:{last}" for first, last in ends]
         out += [
-            Source(n, with_loop(positioned(d.record), text), d.findings, about(d.record), number >= fitted)
+            Source(
+                n,
+                with_loop(d.record if is_steady_table(d.record) else positioned(d.record), text),
+                d.findings,
+                about(d.record),
+                number >= fitted,
+            )
             for n, d in zip(names, every, strict=True)
         ]
     return out

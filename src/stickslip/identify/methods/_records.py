@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from stickslip.errors import InputError, UnknownName
+from stickslip.identify.experiment import TORQUES
 from stickslip.identify.methods.method import Options
 from stickslip.record import Record
 
 MOTORS = ("torque_constant", "force_constant")
-TORQUES = ("motor_torque", "torque", "sensor_torque", "friction_torque")
 CURVE = ("fs", "fc", "vs", "delta_s", "sigma2")
 
 

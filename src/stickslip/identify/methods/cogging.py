@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.cogging import identify_cogging
 from stickslip.identify.estimate import Identification
-from stickslip.identify.methods._records import TORQUES, with_extra
+from stickslip.identify.experiment import TORQUES
+from stickslip.identify.methods._records import with_extra
 from stickslip.identify.methods.method import TORQUE, Method, Options
 from stickslip.record import Record
 

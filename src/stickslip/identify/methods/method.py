@@ -145,6 +145,8 @@ class Method:
         Names of the options that it uses: fields of `Options`, ``loop`` and ``inertia``. Others are refused.
     narrowed : mapping of str to frozenset of str
         By the name of an option: the options that the method uses if that one is given.
+    takes_steady_points : bool
+        Whether a table of velocities and torques without times will do.
     takes_current : bool
         Whether a current without a torque constant will do.
     values : tuple of str, or None
@@ -158,6 +160,7 @@ class Method:
     check: Callable[[Sequence[Record], Options], None]
     uses: frozenset[str] = frozenset()
     narrowed: Mapping[str, frozenset[str]] = field(default_factory=dict[str, frozenset[str]])
+    takes_steady_points: bool = False
     takes_current: bool = False
     values: tuple[str, ...] | None = None
 

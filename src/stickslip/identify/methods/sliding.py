@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip.errors import InputError, UnknownName
+from stickslip.identify.doctor.steady_table import is_steady_table
 from stickslip.identify.estimate import Identification
 from stickslip.identify.fit.axis_start import each_way, frozen_by_default, starts
 from stickslip.identify.methods._records import has_torque, with_torque
@@ -30,7 +31,7 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     if options.per_direction and not options.laws:
         raise InputError("--method sliding --per-direction needs a law; name one, such as --law coulomb")
     records, channel = with_torque(records, options, "sliding")
-    measured, notes = sliding_points(records, torque=channel)
+    measured, notes = points_in(records, channel)
     points = replace(measured, offset=known_offset(measured, options))
     if options.laws:
         laws = [law_of(given) for given in options.laws]
@@ -50,6 +51,28 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
         found = identify_sliding(points, next(iter(templates.values())), noise=options.noise, frozen=frozen)
     said = [PER_DIRECTION] if options.per_direction and "offset" not in options.frozen else []
     return replace(found, notes=(*notes, *said, *found.notes))
+
+
+def points_in(records: Sequence[Record], torque: str) -> tuple[SlidingPoints, tuple[str, ...]]:
+    """Return the points of the records: rows of tables, averages over constant velocities of logs; and notes.
+
+    Raises
+    ------
+    InputError
+        If tables and logs are mixed.
+    """
+    tables = [r for r in records if is_steady_table(r)]
+    if not tables:
+        return sliding_points(records, torque=torque)
+    if len(tables) < len(records):
+        raise InputError(
+            "--method sliding takes either logs with times or tables of steady points; give them apart"
+        )
+    velocity, effort = (np.concatenate([r[name] for r in tables]) for name in ("velocity", torque))
+    linear = tables[0].units["velocity"] == "m/s"
+    unit = "m/s" if linear else "rad/s"
+    reach = f"{float(np.min(velocity)):.3g} to {float(np.max(velocity)):.3g} {unit}"
+    return SlidingPoints(velocity, effort), (f"{velocity.size} steady points of a table, {reach}.",)
 
 
 def known_offset(points: SlidingPoints, options: Options) -> float | None:
@@ -100,5 +123,5 @@ def template(law: Law, velocity: Array, torque: Array, options: Options) -> Mode
 
 METHOD = Method(
     "sliding", "sliding curve from constant velocities", identify, has_torque("sliding"),
-    uses=TORQUE | {"laws", "values", "frozen", "free", "noise", "per_direction"},
+    uses=TORQUE | {"laws", "values", "frozen", "free", "noise", "per_direction"}, takes_steady_points=True,
 )  # fmt: skip
