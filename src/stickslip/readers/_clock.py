@@ -105,11 +105,21 @@ def time_of(
             f"no column is known to be a channel among {_some(table)}; say which is which, "
             "such as --map time=COLUMN:s --map position=COLUMN:deg"
         )
-    steady = "; a table of constant velocities and their torques is for --method sliding"
     raise NoTimes(
         f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give "
-        f"{_by_header(table)}{steady if may_be_steady(by_role) else ''}"
+        f"{_by_header(table)}{_as_steady(by_role)}"
     )
+
+
+def _as_steady(by_role: Mapping[str, Choice]) -> str:
+    """What a table of steady points needs, if this may be one."""
+    if may_be_steady(by_role):
+        return "; a table of constant velocities and their torques is for --method sliding"
+    parts = {"velocity": "velocity" in by_role, "torque": bool(by_role.keys() & EFFORTS)}
+    if "position" in by_role or not any(parts.values()):
+        return ""
+    lacking = next(name for name, known in parts.items() if not known)
+    return f"; for a table of steady points (--method sliding) say --map {lacking}=COLUMN:UNIT"
 
 
 def may_be_steady(by_role: Mapping[str, Choice]) -> bool:

@@ -144,7 +144,9 @@ def record_of(
     sample_time: float | None = None,
     steady: bool = False,
 ) -> Record:
-    """The record of a table; with `steady`, rows without times are steady points (`convert`); errors among the findings about its columns are left to the caller.
+    """The record of a table; with `steady`, rows without times are steady points (see `convert`).
+
+    Errors among the findings about its columns are left to the caller.
 
     Raises
     ------

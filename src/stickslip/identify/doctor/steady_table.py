@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -16,6 +17,8 @@ from stickslip.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+NOTES = "notes_on_rows"
+"""Key of a record's meta: what was left out of a table, in words."""
 MOST = 1000
 """Rows of a table: each is a test at a constant velocity, which takes seconds. More are a log without times."""
 ALIKE = 0.1
@@ -43,6 +46,7 @@ def examine_table(record: Record) -> tuple[Record, list[Finding]]:
         return record, [*findings, Finding("error", "no-clock", message, remedy=remedy)]
     torque = torque_in(record)
     velocity, effort = record["velocity"], record[torque]
+    said: list[str] = []
     known = is_number(velocity) & is_number(effort)
     still = known & (velocity == 0.0)
     left_out = (
@@ -52,12 +56,18 @@ def examine_table(record: Record) -> tuple[Record, list[Finding]]:
     for rows, code, why in left_out:
         if np.any(rows):
             listed = range_words(file_rows(record)[rows])
-            message = f"{np.sum(rows)} of {len(record)} rows {why}: rows {listed}"
-            findings.append(Finding("warning", code, message))
+            said.append(f"{np.sum(rows)} of {len(record)} rows {why}: rows {listed}")
+            findings.append(Finding("note", code, said[-1]))
     kept = taken(record, known & ~still)
-    unused = f"; not used: {', '.join(reading['unused'])}" if reading.get("unused") else ""
-    message = f"the rows have no times: each is taken as a steady point, {len(kept)} of velocity and {torque}{unused}"
+    if not len(kept):
+        message = "no row has a velocity other than 0 and a torque"
+        findings.append(Finding("error", "never-moved", message, remedy="check the columns and their units"))
+        return kept, findings
+    if reading.get("unused"):
+        said.append(f"columns not used: {', '.join(reading['unused'])}")
+    message = f"the rows have no times: each is taken as a steady point, {len(kept)} of velocity and {torque}"
     findings.append(Finding("note", "steady-points", message))
+    kept = replace(kept, meta={**kept.meta, NOTES: said})
     return kept, [*findings, *signs(kept["velocity"], kept[torque])]
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip.errors import InputError, UnknownName
-from stickslip.identify.doctor.steady_table import is_steady_table
+from stickslip.identify.doctor.steady_table import NOTES, is_steady_table
 from stickslip.identify.estimate import Identification
 from stickslip.identify.fit.axis_start import each_way, frozen_by_default, starts
 from stickslip.identify.methods._records import has_torque, with_torque
@@ -72,7 +72,8 @@ def points_in(records: Sequence[Record], torque: str) -> tuple[SlidingPoints, tu
     linear = tables[0].units["velocity"] == "m/s"
     unit = "m/s" if linear else "rad/s"
     reach = f"{float(np.min(velocity)):.3g} to {float(np.max(velocity)):.3g} {unit}"
-    return SlidingPoints(velocity, effort), (f"{velocity.size} steady points of a table, {reach}.",)
+    said = [f"{text[0].upper()}{text[1:]}." for r in tables for text in r.meta[NOTES]]
+    return SlidingPoints(velocity, effort), (f"{velocity.size} steady points of a table, {reach}.", *said)
 
 
 def known_offset(points: SlidingPoints, options: Options) -> float | None:

@@ -29,6 +29,8 @@ COULOMB = "Coulomb with viscous"
 """The candidate that any contact has at least."""
 FOLD_REACH = 10.0
 """Factor within which a parameter of a fit to a part of the points stays around that of the fit to all."""
+FOLD_EXPONENT = 2.0
+"""The same of an exponent: ten times that of a power of the velocity leaves every scale at the next faster point."""
 SPARE = 2
 """Points more than parameters that a curve needs to be compared with others."""
 ALIKE = 0.01
@@ -182,10 +184,11 @@ def left_out_error(
 ) -> Array:
     """Weighted errors at some points of the curve fitted to the others."""
     # Fewer points may leave a parameter open that all of them close: it must not run off and blow the error up.
-    limits = {
-        p.name: (p.value / FOLD_REACH, p.value * FOLD_REACH)
-        for p in steady_vector(points, template, frozen).free if p.logarithmic and p.value > 0.0
-    }  # fmt: skip
+    limits: dict[str, tuple[float, float]] = {}
+    for p in steady_vector(points, template, frozen).free:
+        reach = FOLD_EXPONENT if p.par.unit == "-" else FOLD_REACH
+        if p.logarithmic and p.value > 0.0:
+            limits[p.name] = (p.value / reach, p.value * reach)
     found = fit_sliding(points.only(fitted), template, None, frozen, 2, profiles=False, limits=limits)
     rest = points.only(left_out)
     torques = Torques(found.vector, rest.velocity, rest.side)
