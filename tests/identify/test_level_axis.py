@@ -34,3 +34,22 @@ def test_the_refusal_names_the_way_out() -> None:
         InputError, match=r'fc and offset cannot be.*frozen=\["offset"\], values=\{"offset": 0\}'
     ):
         ss.identify(**staircase(), law="coulomb")
+
+
+def push(period: float = 2e-3) -> dict[str, np.ndarray]:
+    """A push of a second, then coasting to rest; inertia 0.01 kg·m², fc 0.05 N·m, sigma2 0.003 N·m·s/rad."""
+    drive = np.where(np.arange(8000) < 700, 0.6, 0.0)
+    drive[:200] = 0.0
+    position, velocity = np.zeros(8000), 0.0
+    for k in range(1, 8000):
+        friction = 0.05 + 0.003 * velocity if velocity > 0.0 or drive[k] > 0.05 else drive[k]
+        velocity = max(velocity + (drive[k] - friction) / 0.01 * period, 0.0)
+        position[k] = position[k - 1] + velocity * period
+    return {"t": period * np.arange(8000), "position": np.round(position, 4), "torque": drive}
+
+
+def test_coasting_behind_a_push_determines_friction_of_a_level_axis() -> None:
+    found = ss.identify(**push(), law="coulomb", inertia=0.01, frozen=["offset"], values={"offset": 0.0})
+    for name, true in (("fc", 0.05), ("sigma2", 0.003)):
+        assert found[name].identified
+        assert found[name].lower <= true <= found[name].upper

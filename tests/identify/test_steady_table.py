@@ -148,3 +148,13 @@ def test_starts_far_off_overflow_without_a_warning() -> None:
     vector = Vector(ss.Model("coulomb", fc=1.0, sigma2=1.0))
     found = separable_starts(lambda values: 1e200 * values[0] * np.ones(5), np.ones(5), vector, 3)
     assert np.all(np.isfinite(found))
+
+
+def test_a_break_away_torque_below_sliding_is_not_identified() -> None:
+    """A curve that rises from rest fits with fs below fc, which no contact has."""
+    rising = np.sign(BOTH) * (0.4 - 0.1 * np.exp(-((BOTH / 0.15) ** 2))) + 0.08 * BOTH
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(BOTH.size)
+    found = ss.identify(velocity=BOTH, torque=rising + noise, method="sliding", law="stribeck_plain")
+    assert found["fc"].identified
+    assert not found["fs"].identified
+    assert "below fc" in found["fs"].verdict

@@ -64,6 +64,23 @@ def bounded_verdicts(
     return tuple(out)
 
 
+def without_inverted_rest(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """Return the estimates, a break-away torque below the Coulomb torque as not identified.
+
+    Break-away takes at least what sliding takes: a curve that rises from rest has another cause.
+    """
+    levels = {e.name: e for e in estimates}
+    out: list[Estimate] = []
+    for e in estimates:
+        level = levels.get(e.name.replace("fs", "fc", 1)) if e.name.partition("_")[0] == "fs" else None
+        if e.identified and level is not None and level.identified and e.value < level.value:
+            why = f"it is below {level.name}, {level.value:.4g} {level.unit}: friction rises with velocity from rest"
+            out.append(replace(e, identified=False, verdict=f"{why}, which is no break-away"))
+        else:
+            out.append(e)
+    return tuple(out)
+
+
 def within_speeds(
     estimates: Sequence[Estimate], vector: Vector, u: Array, speeds: Array, unit: str = "rad/s"
 ) -> tuple[Estimate, ...]:

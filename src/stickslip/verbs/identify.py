@@ -18,6 +18,7 @@ from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import Diagnosis
 from stickslip.identify.doctor.steady_table import is_steady_table
 from stickslip.identify.estimate import Identification, silent
+from stickslip.identify.evidence import without_inverted_rest
 from stickslip.identify.experiment import DRIVES
 from stickslip.identify.held import held_in
 from stickslip.identify.methods import method_named, methods_by_option
@@ -218,6 +219,7 @@ def with_notes(
     if all(is_linear(r) for r in records):
         # Those two know their axis: their numbers have its units.
         found = worded(found) if kind.name in ("axis", "inertia") else along_a_line(found)
+    found = replace(found, estimates=without_inverted_rest(found.estimates))
     said = (
         *assumptions(found, options, kind.name),
         *load_note(records, found),
