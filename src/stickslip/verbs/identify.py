@@ -82,7 +82,8 @@ def identify(
         Fitted together; none where arrays are given by name (`t`, `position`, `torque`, ...).
     method : str
         One of `stickslip.identify.methods.METHODS`: "axis" (inertia, offset or gravity and friction jointly, from any
-        motion), "sliding" (constant velocities), "breakaway" (torque ramps), "presliding" and "attraction" (GMS),
+        motion), "sliding" (constant velocities, or a table of velocity and torque without times), "breakaway" (torque
+        ramps), "presliding" and "attraction" (GMS),
         "hysteresis" (a measured friction along its motion), "lugre" (sigma0, sigma1), "inertia" (frequency response),
         "cogging" (torque or current over the angle).
     law : str, Law or sequence of these, optional
