@@ -26,6 +26,7 @@ MAP = r"--(?:motion-)?map (?:'[^'=]+=[^']+'|\w+=[^\s,;)]*[^\s,;:)])"
 MAPS = re.compile(rf"({MAP}(?: {MAP})*)( (?=--))?")
 ONE_MAP = re.compile(r"--(?:motion-)?map (?:'([^']+)'|(\S+))")
 SET = re.compile(r"--set (\w+)=(\.\.|[^\s,;:)]*)")
+FREEZE = re.compile(r"--freeze (\w+)=([^\s,;:)]+)")
 LOOP = re.compile(r"--loop (\w+=[^\s;)]*[^\s;),])")
 TIMING = re.compile(r"--torque-is (commanded|actual|mean)\b")
 SIMULATE = "`stickslip simulate`"
@@ -88,6 +89,7 @@ def _said(text: str, function: str, arrays: bool) -> str:
     text = PLACE.sub("choose another place", text)
     text = MAPS.sub(lambda m: _map(m[1], arrays) + (", " if m[2] else ""), text)
     text = SET.sub(lambda m: f'{settings}={{"{m[1]}": {m[2] or ".."}}}', text)
+    text = FREEZE.sub(r'frozen=["\1"], values={"\1": \2}', text)
     text = TIMING.sub(r'torque_is="\1"', text)
     text = LOOP.sub(lambda m: "loop={" + ", ".join(_item(x, "=") for x in m[1].split(",")) + "}", text)
     text = OPTION.sub(lambda m: _argument(m, function), text)
@@ -121,6 +123,8 @@ def _argument(found: re.Match[str], function: str) -> str:
     name = NAMES.get(option, option.replace("-", "_"))
     if option == "to" and function != "export":
         name = "end"
+    if option == "set":
+        name = "settings" if function == "export" else "values"
     if not value:
         return (
             f"{name}=True"

@@ -275,7 +275,7 @@ def test_break_away_from_ramps(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "velocity threshold 0.05 rad/s" in capsys.readouterr().out
     assert main([*again, "-1", "--method", "breakaway"]) == 2
     assert main([*again, "0.05"]) == 2
-    assert "--threshold is for --method breakaway" in capsys.readouterr().err
+    assert "does not use --threshold (methods that do: breakaway)" in capsys.readouterr().err
 
 
 def test_inertia_from_a_frequency_response(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

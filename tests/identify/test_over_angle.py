@@ -171,7 +171,7 @@ def test_the_command_writes_a_map_that_exports_take(
 
 def test_what_is_refused() -> None:
     one = record()
-    with pytest.raises(InputError, match='method="cogging" has none'):
+    with pytest.raises(InputError, match='method="cogging" does not use position_map'):
         ss.identify(one, method="cogging", position_map=True)
     with pytest.raises(InputError, match="harmonics=3"):
         ss.identify(one, harmonics=3, position_map=True)

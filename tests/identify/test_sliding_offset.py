@@ -1,18 +1,20 @@
-"""The constant torque of levels in both directions: its interval holds, and nothing is seen where there is none."""
+"""A constant torque (weight, offset) beside the sliding curve: fitted with it, and never taken for friction."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Identification
 from stickslip.identify.model_file import model_data
-from stickslip.identify.sliding.offset import constant_torque
+from stickslip.identify.sliding.curve import identify_sliding
 from stickslip.identify.sliding.points import SlidingPoints
 
 LAW = ss.Model("stribeck_plain", fs=0.335, fc=0.285, vs=0.05, delta_s=2.0, sigma2=0.018)
+COULOMB = ss.Model("coulomb", fc=0.2, sigma2=0.01)
 SPEEDS = np.array([0.1, 0.2, 0.5, 1.0, 2.0])
 
 
@@ -21,18 +23,11 @@ def steady(velocity: float) -> float:
     return LAW.law.steady(velocity, LAW.parameters)
 
 
-def levels(constant: float, noise: float, seed: int, *, std: bool = True) -> SlidingPoints:
-    velocity = np.concatenate([SPEEDS, -SPEEDS])
-    torque = np.array([steady(v) for v in velocity]) + constant
-    torque += noise * np.random.default_rng(seed).standard_normal(velocity.size)
-    return SlidingPoints(velocity, torque, np.full(velocity.size, noise) if std else None, absolute=std)
-
-
-def record(constant: float) -> ss.Record:
-    """Plateaus of 6 s in both directions with 10 mN·m of noise."""
+def record(constant: float, ways: tuple[float, ...] = (1.0, -1.0)) -> ss.Record:
+    """Plateaus of 6 s with 10 mN·m of noise."""
     rng, dt, position = np.random.default_rng(7), 2e-3, 0.0
     rows: list[np.ndarray] = []
-    for v in (v * side for v in SPEEDS for side in (1.0, -1.0)):
+    for v in (v * side for v in SPEEDS for side in ways):
         k = np.arange(3000)
         torque = steady(v) + constant + 0.01 * rng.standard_normal(k.size)
         rows.append(np.column_stack([position + v * k * dt, torque]))
@@ -44,61 +39,118 @@ def record(constant: float) -> ss.Record:
     )  # fmt: skip
 
 
+def points(weight: float, seed: int, speeds: tuple[float, ...], *, std: bool = True) -> SlidingPoints:
+    """Coulomb friction of 0.08 N·m and a weight on a drum, 1 mN·m of noise."""
+    velocity = np.array(speeds)
+    torque = 0.08 * np.sign(velocity) + 2e-4 * velocity + weight
+    torque += 1e-3 * np.random.default_rng(seed).standard_normal(velocity.size)
+    own = np.full(velocity.size, 1e-3) if std else None
+    return SlidingPoints(velocity, torque, own, absolute=std, offset=None)
+
+
+BOTH_WAYS = (6.0, 12.0, 24.0, -6.0, -12.0, -24.0)
+
+
 @pytest.mark.parametrize("std", [True, False])
-def test_the_interval_holds(std: bool) -> None:
-    found = [constant_torque(levels(0.04, 1e-3, seed, std=std)) for seed in range(100)]
-    told = [e for e in found if e is not None]
-    assert len(told) == 100
-    assert sum(e.lower <= 0.04 <= e.upper for e in told) >= 90
-    assert all(e.identified for e in told)
+def test_the_intervals_contain_friction_and_weight(std: bool) -> None:
+    held = {"fc": 0, "offset": 0}
+    for seed in range(20):
+        found = identify_sliding(points(0.19, seed, BOTH_WAYS, std=std), COULOMB, starts=4)
+        for name, true in (("fc", 0.08), ("offset", 0.19)):
+            held[name] += found[name].lower <= true <= found[name].upper
+            assert found[name].identified
+    assert min(held.values()) >= 17
 
 
-def test_without_a_constant_torque_none_is_seen() -> None:
-    assert sum(constant_torque(levels(0.0, 1e-3, seed)) is not None for seed in range(100)) <= 10
+def test_without_a_weight_the_offset_contains_zero() -> None:
+    none = [identify_sliding(points(0.0, seed, BOTH_WAYS), COULOMB, starts=4)["offset"] for seed in range(20)]
+    assert sum(e.lower <= 0.0 <= e.upper for e in none) >= 17
 
 
-def test_one_direction_or_two_speeds_tell_none() -> None:
-    points = levels(0.04, 1e-3, 0)
-    assert constant_torque(points.only(points.velocity > 0.0)) is None
-    assert constant_torque(points.only(np.abs(points.velocity) < 0.3)) is None
+def test_two_speeds_each_way_determine_the_weight() -> None:
+    found = identify_sliding(points(0.19, 1, (12.0, 24.0, -12.0, -24.0)), COULOMB)
+    assert found["fc"].value == pytest.approx(0.08, abs=3e-3)
+    assert found["offset"].value == pytest.approx(0.19, abs=3e-3)
 
 
-def test_a_break_away_torque_is_no_level() -> None:
-    points = levels(0.04, 1e-3, 0)
-    still = SlidingPoints(np.zeros(2), np.array([0.5, -0.3]), np.full(2, 1e-3), absolute=True)
-    alone, both = constant_torque(points), constant_torque(points + still)
-    assert alone is not None
-    assert both is not None
-    assert both.value == pytest.approx(alone.value)
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_one_direction_determines_the_sum_only(way: float) -> None:
+    found = identify_sliding(points(0.19, 2, tuple(way * v for v in (6.0, 12.0, 18.0, 24.0))), COULOMB)
+    assert not found["fc"].identified
+    assert not found["offset"].identified
+    assert found["sigma2"].value == pytest.approx(2e-4, abs=2e-4)
+    assert f"only fc {'+' if way > 0.0 else '-'} offset" in found["fc"].verdict
+    assert "--freeze offset=0" in found["fc"].verdict
+    assert found["fc"].upper == np.inf
 
 
-def test_what_is_known_badly_is_not_identified() -> None:
-    (found,) = [e for e in [constant_torque(levels(0.3, 0.15, 3))] if e is not None]
-    assert not found.identified
-    assert "exceeds 10 % of friction" in found.verdict
+def test_one_direction_determines_how_far_break_away_exceeds_sliding() -> None:
+    """Both levels contain the constant torque; where the curve bends they do not matter."""
+    velocity = np.geomspace(0.005, 2.0, 15)
+    torque = np.array([steady(v) for v in velocity]) + 0.1
+    some = SlidingPoints(velocity, torque, np.full(15, 1e-4), absolute=True, offset=None)
+    found = identify_sliding(some, LAW)
+    assert {e.name for e in found.estimates if not e.identified} >= {"fs", "fc", "offset"}
+    assert found["vs"].identified
+    assert found["vs"].value == pytest.approx(0.05, rel=0.02)
 
 
-def test_the_method_takes_it_off_and_writes_it_down() -> None:
-    """Fc of the levels as they are would lie between both directions' anyway; the residual would not."""
+def test_a_law_without_a_level_does_not_turn_friction_into_a_weight() -> None:
+    found = identify_sliding(points(0.19, 2, (6.0, 12.0, 18.0, 24.0)), ss.Model("viscous", sigma2=0.01))
+    assert not found["offset"].identified
+
+
+def test_the_method_fits_it_and_writes_it_down() -> None:
     known, shifted = (
         ss.identify(record(c), method="sliding", law="coulomb").identification for c in (0.0, 0.04)
     )
-    assert isinstance(shifted, Identification)
-    assert "offset" not in {e.name for e in known.estimates}
     offset = shifted["offset"]
+    assert offset.identified
     assert offset.lower <= 0.04 <= offset.upper
     assert shifted["fc"].value == pytest.approx(known["fc"].value, rel=1e-3)
     assert shifted.misfit["rms_Nm"] == pytest.approx(known.misfit["rms_Nm"], rel=0.05)
     assert shifted.correlation.shape == (len(shifted.estimates),) * 2
-    assert any("constant torque of 0.0" in note for note in shifted.notes)
+    assert any("constant torque of 0.04 N·m acts" in note for note in shifted.notes)
     assert model_data(shifted, [])["axis"] == {"offset": pytest.approx(offset.value)}
     assert "axis" not in model_data(known, [])
 
 
+def test_one_direction_gives_a_model_that_nothing_is_built_on(tmp_path: Path) -> None:
+    found = ss.identify(record(0.2, (1.0,)), method="sliding", law="coulomb")
+    assert not found["fc"].identified
+    file = found.save(tmp_path)
+    with pytest.raises(InputError, match="does not determine the friction level"):
+        ss.recommend(file, inertia=1e-3, bandwidth=5.0, sample_time=1e-3)
+    assert not any("export" in step.command or "recommend" in step.command for step in found.answers.steps)
+
+
+def test_a_known_constant_torque_determines_friction_in_one_direction() -> None:
+    one_way = record(0.2, (1.0,))
+    found = ss.identify(one_way, method="sliding", law="coulomb", frozen=["offset"], values={"offset": 0.2})
+    assert found["fc"].identified
+    assert found["fc"].value == pytest.approx(0.29, abs=0.02)
+    assert dict(found.given) == {"offset": 0.2}
+    with pytest.raises(InputError, match=r'offset cannot be held without a value; give values=\{"offset"'):
+        ss.identify(one_way, method="sliding", law="coulomb", frozen=["offset"])
+
+
+def test_few_points_are_fitted_by_coulomb_friction() -> None:
+    """A curve without a level, the only one left to compare, took friction for a constant torque."""
+    still = record(0.2, (1.0, -1.0))
+    rows = still.time < 24.0  # two speeds each way
+    few = ss.Record(still.time[rows], {k: v[rows] for k, v in still.channels.items()}, still.units)
+    found = ss.identify(few, method="sliding")
+    assert found.model.law.name == "coulomb"
+    assert any("too few to choose" in note for note in found.notes)
+
+
 def test_by_direction_a_law_takes_it_up() -> None:
-    """Levels of its own for each direction differ by twice the constant torque, of which none is left."""
-    found = ss.identify(record(0.04), method="sliding", law="coulomb", per_direction=True).identification
-    assert "offset" not in {e.name for e in found.estimates}
+    """Levels of its own for each direction differ by twice the constant torque, which is held at 0."""
+    found = ss.identify(record(0.04), method="sliding", law="coulomb", per_direction=True)
+    assert "offset" not in found.parameters
     assert found["fc"].value - found["fc_negative"].value == pytest.approx(0.08, abs=2e-3)
+    assert any("holds offset at 0" in note for note in found.notes)
     with pytest.raises(InputError, match="needs a law; name one"):
         ss.identify(record(0.04), method="sliding", per_direction=True)
+    with pytest.raises(InputError, match="both directions, and the record has one"):
+        ss.identify(record(0.04, (1.0,)), method="sliding", law="coulomb", per_direction=True)

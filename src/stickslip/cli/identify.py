@@ -6,10 +6,11 @@ stickslip identify a.csv b.csv --hold-out c.csv --law my_law.py --out friction
 stickslip identify steps.csv --method sliding --law stribeck --noise 1e-4
 
 The records are checked first (`stickslip doctor`); an error stops the identification. Methods: `axis` (inertia, offset
-or gravity and friction jointly, from any motion), `sliding` (constant velocities), `breakaway` (torque ramps),
-`presliding` and `attraction` (GMS), `hysteresis` (friction measured along a motion), `lugre` (sigma0, sigma1),
-`inertia` (frequency response), `cogging` (torque over the angle). Several laws are compared by their error on held-out
-data; `sliding` without --law compares the curves of the thesis. With --loop and a reference in the record the closed
+or gravity and friction jointly, from any motion), `sliding` (constant velocities, in a log or as a table of velocities
+and torques without times), `breakaway` (torque ramps), `presliding` and `attraction` (GMS), `hysteresis` (friction
+measured along a motion), `lugre` (sigma0, sigma1), `inertia` (frequency response), `cogging` (torque over the angle).
+Several laws are compared by their error on held-out data; `sliding` without --law compares the curves of the thesis.
+An option that the method does not use is refused. With --loop and a reference in the record the closed
 loop is simulated, otherwise the recorded drive signal is the input. --out names a folder for model.toml and
 report.html, or the model file, with the report next to it; a study or simulation uses the model by `law = {model =
 "model.toml"}`. The last line printed is the next command.
@@ -52,6 +53,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", type=Path, metavar="MODEL.toml", help="model of an earlier identification")
     parser.add_argument(
         "--torque", metavar="CHANNEL", help="torque channel: motor_torque, sensor_torque, ... (not axis)"
+    )
+    parser.add_argument(
+        "--extra-torque",
+        metavar="CHANNEL",
+        help="known torque added to the recorded one, such as compensation_torque",
     )
     parser.add_argument(
         "--elements",
@@ -112,7 +118,7 @@ def _law_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[reportPrivateUsage]
-    """What only the method `axis` (and `inertia`) looks at."""
+    """Options of the method `axis`, and of those that need an experiment of an axis."""
     parser.add_argument(
         "--inertia", type=float, metavar="J", help="known inertia, kg·m² (kg of a linear axis): not fitted"
     )
@@ -139,11 +145,6 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
         help="quantity that the loop outputs if no drive signal is recorded (default torque, or voltage with "
         "--resistance); a voltage is a duty cycle if the record has the supply voltage",
     )  # fmt: skip
-    parser.add_argument(
-        "--extra-torque",
-        metavar="CHANNEL",
-        help="known torque added to the recorded one, such as compensation_torque",
-    )
     parser.add_argument(
         "--torque-is", choices=("commanded", "actual", "mean"),
         help="meaning of the torque column: commanded from this row to the next, actual at the row, or "

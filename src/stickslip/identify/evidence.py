@@ -55,12 +55,29 @@ def bounded_verdicts(
     """The estimates, those refused that only such a bound, named by `what`, limits."""
     out: list[Estimate] = []
     for e in estimates:
-        least, most = limits.get(e.name, (0.0, np.inf))
+        least, most = limits.get(e.name, (-np.inf, np.inf))
         above = e.upper >= most * (1.0 - 1e-6)
         bound = e.identified and (above or e.lower <= least * (1.0 + 1e-6))
         side, edge = ("above", most) if above else ("below", least)
         why = f"no data limit it from {side} but {what} ({edge:.4g} {e.unit})"
         out.append(replace(e, identified=False, verdict=why) if bound else e)
+    return tuple(out)
+
+
+def without_inverted_rest(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """Return the estimates, a break-away torque below the Coulomb torque as not identified.
+
+    Break-away takes at least what sliding takes: a curve that rises from rest has another cause.
+    """
+    levels = {e.name: e for e in estimates}
+    out: list[Estimate] = []
+    for e in estimates:
+        level = levels.get(e.name.replace("fs", "fc", 1)) if e.name.partition("_")[0] == "fs" else None
+        if e.identified and level is not None and level.identified and e.value < level.value:
+            why = f"it is below {level.name}, {level.value:.4g} {level.unit}: friction rises with velocity from rest"
+            out.append(replace(e, identified=False, verdict=f"{why}, which is no break-away"))
+        else:
+            out.append(e)
     return tuple(out)
 
 

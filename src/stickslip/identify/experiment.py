@@ -21,6 +21,8 @@ DRIVES = {
     "voltage": "voltage",
 }  # fmt: skip
 """Channels that may hold the drive's signal, in the order in which they are looked for, and what they are."""
+TORQUES = ("motor_torque", "torque", "sensor_torque", "friction_torque")
+"""Channels of a torque that methods without an equation of motion read, in the order in which they are looked for."""
 REFERENCES = ("position_reference", "reference")
 FASTER, WINDOW = 1.5, 0.1
 """Times as fast that the end of an experiment must be to be fitted instead of its start; s over which a speed is

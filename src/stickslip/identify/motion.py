@@ -204,7 +204,7 @@ def motion_of(record: Record, source: str = "") -> Motion:
 def speeds_of(records: Sequence[Record]) -> dict[str, list[float]]:
     """Quantiles (0, 0.1, ..., 1) of the recorded speeds in either direction, rad/s, over a fiftieth of a second each.
 
-    What is below a thousandth of the greatest speed is rest.
+    Less than a thousandth of the greatest speed is rest.
     """
     found: list[Array] = []
     for record in records:
@@ -215,7 +215,11 @@ def speeds_of(records: Sequence[Record]) -> dict[str, list[float]]:
         begin, end = float(time[0]), float(time[-1])
         grid: Array = np.linspace(begin, end, max(2, 1 + round((end - begin) / WINDOW)))
         found.append(np.diff(np.interp(grid, time, position)) / (grid[1] - grid[0]))
-    velocity = np.concatenate(found) if found else np.zeros(0)
+    return speeds_in(np.concatenate(found) if found else np.zeros(0))
+
+
+def speeds_in(velocity: Array) -> dict[str, list[float]]:
+    """Return the quantiles (0, 0.1, ..., 1) of the speeds in either direction, by "positive" and "negative"."""
     rest = 1e-3 * float(np.max(np.abs(velocity), initial=0.0))
     out: dict[str, list[float]] = {}
     for side, name in ((1.0, "positive"), (-1.0, "negative")):

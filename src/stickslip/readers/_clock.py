@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -49,8 +49,14 @@ MOST_FILLED, UNEVEN, EVEN = 0.9, 0.5, 0.95
 and its times are even: this part of the steps is off by at most this part of the usual step. Lost samples are not."""
 LONGEST_NAME = 60
 """Letters of a column's name that an error quotes."""
+EFFORTS = {"motor_torque", "friction_torque", "sensor_torque", "current"}
+"""Channels that tell the torque at a constant velocity."""
 SAME = 0.01
 """Part of a stated period by which a column of times may differ from it without a word."""
+
+
+class NoTimes(InputError):
+    """A table whose rows have no times."""
 
 
 def time_of(
@@ -104,9 +110,9 @@ def time_of(
             f"no column is known to be a channel among {_some(table)}; say which is which, "
             f"such as --map time=COLUMN:s --map position=COLUMN:deg{_of_tool(table)}"
         )
-    raise InputError(
+    raise NoTimes(
         f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give "
-        f"{_by_header(table)}"
+        f"{_by_header(table)}{_as_steady(by_role)}"
     )
 
 
@@ -122,6 +128,22 @@ def _period_of(table: Table) -> tuple[str, float] | None:
 def _of_tool(table: Table) -> str:
     """What is known of the tool that wrote the table, for an error."""
     return "".join(f"; {f.message}; {f.remedy}" for f in table.findings if f.code == "tool")
+
+
+def _as_steady(by_role: Mapping[str, Choice]) -> str:
+    """What a table of steady points needs, if this may be one."""
+    if may_be_steady(by_role):
+        return "; a table of constant velocities and their torques is for --method sliding"
+    parts = {"velocity": "velocity" in by_role, "torque": bool(by_role.keys() & EFFORTS)}
+    if "position" in by_role or not any(parts.values()):
+        return ""
+    lacking = next(name for name, known in parts.items() if not known)
+    return f"; for a table of steady points (--method sliding) say --map {lacking}=COLUMN:UNIT"
+
+
+def may_be_steady(by_role: Mapping[str, Choice]) -> bool:
+    """Whether rows without times may be steady points: they have a velocity and an effort, and no position."""
+    return "velocity" in by_role and "position" not in by_role and bool(by_role.keys() & EFFORTS)
 
 
 def _by_header(table: Table) -> str:

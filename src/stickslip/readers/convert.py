@@ -7,10 +7,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers._choose import Choice
-from stickslip.readers._clock import on_clock, on_own_clocks, restated, time_of, times_of
+from stickslip.readers._clock import (
+    NoTimes,
+    may_be_steady,
+    on_clock,
+    on_own_clocks,
+    restated,
+    time_of,
+    times_of,
+)
 from stickslip.readers._names import KINDS, commanded, role_of
 from stickslip.readers._units import SI, Unit, parse_unit
 from stickslip.readers.table_columns import Array, Column, Table
@@ -111,8 +121,13 @@ def convert(
     drive: Drive,
     sample_time: float | None,
     findings: Sequence[Finding],
+    *,
+    steady: bool = False,
 ) -> Record:
     """Make the record.
+
+    With `steady`, rows without times, of a velocity and a torque, are steady points: their times are 0, and
+    `steady_points` of ``meta["reading"]`` is true.
 
     Raises
     ------
@@ -123,10 +138,17 @@ def convert(
     by_role = {choice.role: choice for choice in choices}
     linear = is_linear(by_role)
     columns = {c.name: c for c in table.columns}
-    time, origin, more = time_of(table, by_role, columns, sample_time)
+    try:
+        time, origin, more = time_of(table, by_role, columns, sample_time)
+        steady = False
+    except NoTimes:
+        if not (steady and may_be_steady(by_role)):
+            raise
+        time, origin, more = np.zeros(columns[by_role["velocity"].column].values.size), 0.0, []
     said += more
-    columns = restated(columns, by_role, sample_time)
-    columns, time = on_own_clocks(columns, by_role, time, origin)
+    if not steady:
+        columns = restated(columns, by_role, sample_time)
+        columns, time = on_own_clocks(columns, by_role, time, origin)
     if time.size == 0:
         raise InputError("there are no rows; give a record with samples")
     channels: dict[str, Array] = {}
@@ -149,6 +171,8 @@ def convert(
     said += [*_idle_gear(listed, drive), *_idle_numbers(listed, drive)]
     derived, more = _torque_from_current(channels, units, drive, linear)
     reading = _reading(table, listed, drive, origin, [*said, *more])
+    if steady:
+        reading["steady_points"] = True
     return Record(time, channels, units, {"reading": reading, "derived": derived})
 
 

@@ -158,8 +158,11 @@ def record_of(
     drive: Drive | None = None,
     profile: profiles.Profile | None = None,
     sample_time: float | None = None,
+    steady: bool = False,
 ) -> Record:
-    """The record of a table; errors among the findings about its columns are left to the caller.
+    """The record of a table; with `steady`, rows without times are steady points (see `convert`).
+
+    Errors among the findings about its columns are left to the caller.
 
     Raises
     ------
@@ -177,8 +180,9 @@ def record_of(
     # Damaged files hold numbers that overflow: they are infinite then, and the doctor finds them.
     with np.errstate(all="ignore"):
         record = convert(
-            table, told(choices, table, settings), settings, period, [*table.findings, *findings]
-        )
+            table, told(choices, table, settings), settings, period, [*table.findings, *findings],
+            steady=steady,
+        )  # fmt: skip
     said_of_it = cast("list[dict[str, Any]]", record.meta["reading"]["findings"])
     for finding in said_of_it if remembered else ():
         if finding["code"] == "time-overruled":

@@ -9,6 +9,7 @@ from typing import Any, cast
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.identify.doctor import Diagnosis, examine, of_arrays
+from stickslip.identify.doctor.steady_table import is_steady_table
 from stickslip.identify.regression.regressions import Regress
 from stickslip.in_python import in_python
 from stickslip.readers.cut import pieces
@@ -48,7 +49,7 @@ class Examiner:
         for data in cast("list[dict[str, Any]]", record.meta.get("reading", {}).get("findings", [])):
             if data["code"] in CODES:
                 self.say(named(log), Finding.from_data(data), record)
-        parts, short = pieces(record)
+        parts, short = ([record], []) if is_steady_table(record) else pieces(record)
         every = [examine(part, accept=self.accept, regress=self.regress) for part in parts]
         for found in every:
             if found.errors:

@@ -12,6 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from stickslip.approval import allow_code
 from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.config import Table
@@ -19,10 +21,11 @@ from stickslip.errors import InputError
 from stickslip.extras import needed
 from stickslip.finding import Finding
 from stickslip.identify.doctor import findings_in_python
+from stickslip.identify.doctor.steady_table import is_steady_table
 from stickslip.identify.estimate import Estimate, Held, Identification, Picture
 from stickslip.identify.identified_file import Identified, identified_in
 from stickslip.identify.model_file import in_memory, model_content, versions, write_model
-from stickslip.identify.motion import motion_of, speeds_of
+from stickslip.identify.motion import motion_of, speeds_in, speeds_of
 from stickslip.in_python import data_in_python, in_python
 from stickslip.machines.identified import identified_machine
 from stickslip.machines.machine import Machine
@@ -252,6 +255,9 @@ class IdentificationResult:
         fitted = [s for s in self.sources if not s.held_out and "position" in s.record.channels]
         out: dict[str, Any] = self.answers.as_dict()
         if fitted and (speeds := speeds_of([s.record for s in fitted])):
+            out["speeds"] = speeds
+        tables = [s.record["velocity"] for s in self.sources if is_steady_table(s.record)]
+        if tables and (speeds := speeds_in(np.concatenate(tables))):
             out["speeds"] = speeds
         for source in fitted:
             try:

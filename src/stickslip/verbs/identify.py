@@ -17,11 +17,13 @@ from stickslip.control.own_loop import loop_text
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import Diagnosis
+from stickslip.identify.doctor.steady_table import is_steady_table
 from stickslip.identify.estimate import Identification, silent
+from stickslip.identify.evidence import without_inverted_rest
 from stickslip.identify.experiment import DRIVES
 from stickslip.identify.held import held_in
-from stickslip.identify.methods import method_named
-from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.methods import method_named, methods_by_option
+from stickslip.identify.methods.method import Method, Options, given_in
 from stickslip.identify.on_a_line import along_a_line, worded
 from stickslip.identify.regression.regressions import Regressions
 from stickslip.model import Model
@@ -81,7 +83,8 @@ def identify(
         Fitted together; none where arrays are given by name (`t`, `position`, `torque`, ...).
     method : str
         One of `stickslip.identify.methods.METHODS`: "axis" (inertia, offset or gravity and friction jointly, from any
-        motion), "sliding" (constant velocities), "breakaway" (torque ramps), "presliding" and "attraction" (GMS),
+        motion), "sliding" (constant velocities, or a table of velocity and torque without times), "breakaway" (torque
+        ramps), "presliding" and "attraction" (GMS),
         "hysteresis" (a measured friction along its motion), "lugre" (sigma0, sigma1), "inertia" (frequency response),
         "cogging" (torque or current over the angle).
     law : str, Law or sequence of these, optional
@@ -155,7 +158,6 @@ def identify(
         One line that names the thing, its value and the remedy; an error of the doctor, too.
     """
     kind = method_named(method)
-    refused_for(method, kind.holds_out, threshold, bool(_listed(hold_out)), position_map)
     regress = Regressions()
     laws, left_out = laws_of(law)
     known = dict(values or {}) | ({} if inertia is None else {"inertia": inertia})
@@ -166,8 +168,10 @@ def identify(
         loop_output, extra_torque, torque_is, delay, harmonics, load, intervals, robust, regress, progress,
         position_map, reading.get("force_constant"),
     )  # fmt: skip
+    given = given_in(options, inertia=inertia is not None, loop=bool(loop), hold_out=bool(_listed(hold_out)))
+    kind.refuse_unused(given, methods_by_option())
     examiner = Examiner((*accept, *(["missing-column"] if kind.takes_current else [])), regress, tell)
-    sources = sources_of(logs, _listed(hold_out), loop, reading, examiner)
+    sources = sources_of(logs, _listed(hold_out), loop, reading, examiner, steady=kind.takes_steady_points)
     if pendulum:
         sources = [replace(s, findings=with_pendulum(s)) for s in sources]
     records = [s.record for s in sources]
@@ -176,6 +180,7 @@ def identify(
         kind = method_named("hysteresis")
         why = "the friction itself is recorded, and no torque of a drive"
         tell(f"{why}: --method hysteresis is taken, a law along the motion")
+        kind.refuse_unused(given, methods_by_option())
     kind.refuse_unknown(options)
     kind.check(records, options)
     examiner.warn(sources)
@@ -213,9 +218,10 @@ def with_notes(
     found: Identification, kind: Method, records: Sequence[Record], options: Options, more: Sequence[str]
 ) -> Identification:
     """What was found in the units of the records, with what a reader must know of it."""
-    if all(r.units.get("position") == "m" for r in records):
+    if all(is_linear(r) for r in records):
         # Those two know their axis: their numbers have its units.
         found = worded(found) if kind.name in ("axis", "inertia") else along_a_line(found)
+    found = replace(found, estimates=without_inverted_rest(found.estimates))
     said = (
         *assumptions(found, options, kind.name),
         *load_note(records, found),
@@ -226,14 +232,9 @@ def with_notes(
     return replace(found, notes=(*found.notes, *said), held=held)
 
 
-def refused_for(method: str, holds_out: bool, threshold: float | None, hold_out: bool, over: bool) -> None:
-    """Refuse what the method would not look at."""
-    if threshold is not None and method != "breakaway":
-        raise InputError(f"--threshold is for --method breakaway; --method {method} has none")
-    if over and method != "axis":
-        raise InputError(f"--position is for --method axis; --method {method} has none")
-    if hold_out and not holds_out:
-        raise InputError(f"--hold-out is for --method axis; --method {method} has none")
+def is_linear(record: Record) -> bool:
+    """Whether the record is of an axis that moves along a line."""
+    return "m" in (record.units.get("position"), record.units.get("velocity", "").removesuffix("/s"))
 
 
 def laws_of(law: str | Law | Sequence[str | Law] | None) -> tuple[tuple[str | Law, ...], list[str]]:
@@ -252,8 +253,9 @@ def laws_of(law: str | Law | Sequence[str | Law] | None) -> tuple[tuple[str | La
 
 
 def sources_of(
-    logs: Sequence[Log], held_out: Sequence[Log], loop: Loops, reading: Reading, examiner: Examiner
-) -> list[Source]:
+    logs: Sequence[Log], held_out: Sequence[Log], loop: Loops, reading: Reading, examiner: Examiner, *,
+    steady: bool = False,
+) -> list[Source]:  # fmt: skip
     """Every log read, looked at by the doctor, with its loop."""
     given: list[Log | None] = [*(logs or [None]), *held_out]
     fitted = len(given) - len(held_out)
@@ -268,7 +270,7 @@ def sources_of(
             return examiner.pieces(record, log)
 
         try:
-            opened = open_log(log, own, doctor)
+            opened = open_log(log, own, doctor, steady=steady)
         except InputError as error:
             if number < fitted:
                 raise
@@ -280,7 +282,13 @@ def sources_of(
             ends = [file_rows(d.record)[[0, -1]] for d in every]
             names = [f"{short} rows {first}:{last}" for first, last in ends]
         out += [
-            Source(n, with_loop(positioned(d.record), text), d.findings, about(d.record), number >= fitted)
+            Source(
+                n,
+                with_loop(d.record if is_steady_table(d.record) else positioned(d.record), text),
+                d.findings,
+                about(d.record),
+                number >= fitted,
+            )
             for n, d in zip(names, every, strict=True)
         ]
     return out

@@ -172,12 +172,12 @@ def check_reading(given: Mapping[str, Any]) -> None:
 
 
 def open_log(
-    log: Log | None, reading: Reading, accept: Callable[[Record], object] = lambda _: None
-) -> Opened:
+    log: Log | None, reading: Reading, accept: Callable[[Record], object] = lambda _: None, *, steady: bool = False
+) -> Opened:  # fmt: skip
     """As `read`, with what a saved profile had to do with it; ambiguous columns are left among the record's findings.
 
     With `remember`, what `map` and the numbers say is kept for the next file with these columns, unless `accept` raises
-    on the record: what reads it wrongly is not for the next file.
+    on the record: what reads it wrongly is not for the next file. With `steady`, rows without times are steady points.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def open_log(
         if log is not None:
             given = [n for n in SIGNALS if said.get(n) is not None]
             raise InputError(f"{', '.join(given)} and a log exclude each other; give one of them")
-        return Opened(_part(_of_signals(signals, reading), reading, "the arrays"))
+        return Opened(_part(_of_signals(signals, reading, steady), reading, "the arrays"))
     if reading.get("units"):
         raise InputError("units is for arrays; give the unit of a column in map, such as q:deg")
     if log is None:
@@ -205,8 +205,8 @@ def open_log(
                 )
         return Opened(_part(log, reading, "the record"))
     if isinstance(log, (str, os.PathLike)):
-        return _of_file(Path(cast("str", log)), reading, accept)
-    return Opened(_part(_of_data(log, reading), reading, "the log"))
+        return _of_file(Path(cast("str", log)), reading, accept, steady)
+    return Opened(_part(_of_data(log, reading, steady), reading, "the log"))
 
 
 def _arrays_in(log: Any, reading: Reading) -> dict[str, ArrayLike]:
@@ -218,7 +218,7 @@ def _arrays_in(log: Any, reading: Reading) -> dict[str, ArrayLike]:
     return {SHORT.get(str(n), str(n)): values for n, values in arrays.items()} if known else {}
 
 
-def _of_signals(signals: Mapping[str, ArrayLike], reading: Reading) -> Record:
+def _of_signals(signals: Mapping[str, ArrayLike], reading: Reading, steady: bool) -> Record:
     for name in ("map", "profile", "beside"):
         if reading.get(name):
             raise InputError(f"{name} applies to columns of files and frames, not to arrays; leave it out")
@@ -229,11 +229,13 @@ def _of_signals(signals: Mapping[str, ArrayLike], reading: Reading) -> Record:
         )
     units = {SHORT.get(n, n): unit for n, unit in reading.get("units", {}).items()}
     table, mapping = table_of_signals(signals, units, {channel: n for n, channel in SHORT.items()})
-    record = record_of(table, mapping, drive=_drive(reading), sample_time=reading.get("sample_time"))
+    record = record_of(
+        table, mapping, drive=_drive(reading), sample_time=reading.get("sample_time"), steady=steady
+    )
     return _with_digest(record, digest_of(table))
 
 
-def _of_data(data: Any, reading: Reading) -> Record:
+def _of_data(data: Any, reading: Reading, steady: bool) -> Record:
     if reading.get("beside"):
         raise InputError("beside joins two files; put the columns of both into one table instead")
     table = table_in_memory(data)
@@ -242,8 +244,9 @@ def _of_data(data: Any, reading: Reading) -> Record:
     period = reading.get("sample_time")
     try:
         record = record_of(
-            table, reading.get("map", ()), drive=_drive(reading), sample_time=period, profile=kept
-        )
+            table, reading.get("map", ()), drive=_drive(reading), sample_time=period, profile=kept,
+            steady=steady,
+        )  # fmt: skip
     except InputError as error:
         raise InputError(f"the log: {error}") from None
     return _with_digest(record, digest_of(table))
@@ -254,7 +257,7 @@ def _with_digest(record: Record, digest: str) -> Record:
     return replace(record, meta={**record.meta, "reading": said})
 
 
-def _of_file(path: Path, reading: Reading, accept: Callable[[Record], object]) -> Opened:
+def _of_file(path: Path, reading: Reading, accept: Callable[[Record], object], steady: bool) -> Opened:
     require(path, "record")
     table, period = open_table(path), reading.get("sample_time")
     asked = reading.get("map", ())
@@ -264,13 +267,15 @@ def _of_file(path: Path, reading: Reading, accept: Callable[[Record], object]) -
         table = joined(table, beside, mapping, period)
     profile = Path(given) if (given := reading.get("profile")) else None
     if profile is None and reading.get("remember", False):
-        return _as_remembered(path, table, mapping, reading, accept)
+        return _as_remembered(path, table, mapping, reading, accept, steady)
     keeps = bool(reading.get("remember", False))
     used = profile if profile and (profile.exists() or not keeps) else None
     kept = profiles.load(used) if used else None
     drive = _drive(reading)
     record = _part(
-        record_of(table, mapping, drive=drive, profile=kept, sample_time=period), reading, str(path)
+        record_of(table, mapping, drive=drive, profile=kept, sample_time=period, steady=steady),
+        reading,
+        str(path),
     )
     written = None
     if keeps and (_tells(mapping, drive, period) or not used):
@@ -287,13 +292,14 @@ def _tells(mapping: Sequence[str], drive: Drive, period: float | None) -> bool:
 
 
 def _as_remembered(
-    path: Path, table: Table, mapping: Sequence[str], reading: Reading, accept: Callable[[Record], object]
-) -> Opened:
+    path: Path, table: Table, mapping: Sequence[str], reading: Reading, accept: Callable[[Record], object],
+    steady: bool,
+) -> Opened:  # fmt: skip
     """A file read by what was said of files with its columns, which is kept for the next one."""
     found, digest = profiles.remembered(table), remembered.digest_of_file(path)
     kept = profiles.load(found) if found else None
     drive, period = _drive(reading), reading.get("sample_time")
-    record, notes = _recalled(table, mapping, reading, found, kept, digest)
+    record, notes = _recalled(table, mapping, reading, found, kept, digest, steady)
     # Whoever judges the record has to know of the profile before.
     record = _part(record, reading, str(path))
     said: dict[str, Any] = record.meta["reading"]
@@ -315,16 +321,18 @@ def _as_remembered(
 
 def _recalled(
     table: Table, mapping: Sequence[str], reading: Reading, found: Path | None, kept: profiles.Profile | None,
-    digest: str,
+    digest: str, steady: bool,
 ) -> tuple[Record, list[Finding]]:  # fmt: skip
     """The record of a table by what the profile at `found` says of it, and what that did."""
     drive, period, recalled = _drive(reading), reading.get("sample_time"), None
     if found is None or kept is None:
-        return record_of(table, mapping, drive=drive, sample_time=period), []
+        return record_of(table, mapping, drive=drive, sample_time=period, steady=steady), []
     try:
         given = [n for n in (*NUMBERS, "side", "sample_time") if reading.get(n) is not None]
         recalled = remembered.recall(kept, table, mapping, drive, given, digest)
-        record = record_of(table, mapping, drive=drive, profile=recalled.profile, sample_time=period)
+        record = record_of(
+            table, mapping, drive=drive, profile=recalled.profile, sample_time=period, steady=steady
+        )
     except InputError as error:
         raise remembered.blamed(error, found, kept, recalled, mapping) from None
     return record, remembered.findings_of(found, recalled, mapping, record)

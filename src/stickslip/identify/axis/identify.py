@@ -241,7 +241,7 @@ def looked_at(
     sliding, notes = regressed(experiments, axis, skew, period, regress, per_direction, known)
     experiments = at_the_middle(aligned(experiments, sliding), axis, sliding)
     validation = aligned(validation, sliding)
-    inverse, more = first_look(experiments, axis, extras, per_direction)
+    inverse, more = first_look(experiments, axis, extras, per_direction, known)
     unchecked = sliding is None and all(t.drive is not None for t in experiments)
     said = [
         *(on_timing(sliding) if skew is None else []),
@@ -346,12 +346,14 @@ def held_out(
 
 
 def first_look(
-    experiments: Sequence[Experiment], axis: ServoAxis, extras: Extras, per_direction: bool
-) -> tuple[InverseDynamics | None, list[str]]:
-    """The inverse dynamics, where the records allow one."""
+    experiments: Sequence[Experiment], axis: ServoAxis, extras: Extras, per_direction: bool,
+    known: Mapping[str, float],
+) -> tuple[InverseDynamics | None, list[str]]:  # fmt: skip
+    """Return the inverse dynamics, if the records allow one, with a known constant torque held."""
+    held = {name: value for name, value in known.items() if name == "offset"}
     try:
         found = inverse_dynamics(
-            experiments, axis, harmonics=extras.harmonics, harmonic_period=extras.harmonic_period
+            experiments, axis, harmonics=extras.harmonics, harmonic_period=extras.harmonic_period, held=held
         )
     except InputError as error:
         return None, [f"No inverse dynamics: {error}"]

@@ -29,6 +29,7 @@ from stickslip.identify.doctor import (
     units,
     velocity,
 )
+from stickslip.identify.doctor.steady_table import examine_table, is_steady_table
 from stickslip.identify.doctor.view import View
 from stickslip.identify.regression.regression import regress_axis
 from stickslip.identify.regression.regressions import Regress
@@ -172,6 +173,9 @@ def examine(
     for code in accept:
         if code not in ERRORS:
             raise UnknownName("error of the doctor", code, ERRORS)
+    if is_steady_table(record):
+        kept, found = examine_table(record)
+        return Diagnosis(tuple(sorted_findings(accepted(found, accept))), kept)
     view = View(record, regress)
     reading = cast("Mapping[str, Any]", record.meta.get("reading", {}))
     findings = [Finding.from_data(f) for f in reading.get("findings", [])]
@@ -200,12 +204,16 @@ def examine(
     causes = {f.code for f in findings if f.level == "error" and f.code not in accept}
     follow = {code for cause in causes for code in CONSEQUENCES.get(cause, ())}
     findings = by_profile.told([f for f in findings if f.code not in follow], view)
-    findings = [
+    kept, trimmed = _usable_rows(view)
+    return Diagnosis(tuple(sorted_findings([*accepted(findings, accept), *trimmed])), kept)
+
+
+def accepted(findings: Sequence[Finding], accept: Sequence[str]) -> list[Finding]:
+    """Return the findings, errors that the caller accepts as warnings."""
+    return [
         replace(f, level="warning") if f.level == "error" and f.code in accept and f.code not in FINAL else f
         for f in findings
     ]
-    kept, trimmed = _usable_rows(view)
-    return Diagnosis(tuple(sorted_findings([*findings, *trimmed])), kept)
 
 
 def _usable_rows(view: View) -> tuple[Record, list[Finding]]:

@@ -67,7 +67,8 @@ def moved(view: View) -> Iterator[Finding]:
                 "error",
                 "no-torque",
                 f"{view.torque_channel} is {torque[0]:g} throughout",
-                remedy=f"check that {view.name(view.torque_channel)!r} was logged",
+                remedy=f"check that {view.name(view.torque_channel)!r} was logged; if the axis coasts with the drive "
+                "off, log the push before it as well",
             )
 
 

@@ -21,6 +21,8 @@ Values = Callable[[Array], Array]
 
 REACH = 4.0
 """How far the nonlinear parameters are drawn from the vector's start, in coordinates."""
+LARGEST = 1e150
+"""Of a column of the linear part: the square of more overflows."""
 ITERATIONS = 100
 """Of the linear part of a start: its active set changes once in each. (The reflective method of SciPy halves a step
 without end where rounding lets none succeed.) A start that takes more is as far as it then is; the search goes on."""
@@ -85,7 +87,8 @@ def separable_starts(model: Values, target: Array, vector: Vector, count: int) -
             if linear
             else None
         )
-        if columns is not None and np.all(np.isfinite(columns)):
+        # Exponents that are drawn far off make powers whose squares overflow: such a start is left as drawn.
+        if columns is not None and np.all(np.abs(columns) < LARGEST):
             drawn[linear] = bounded_solution(columns, target - base, *bounds)
         if all(math.isfinite(x) for x in drawn):
             out.append(vector.coordinates(dict(zip(vector.names, drawn.tolist(), strict=True))))

@@ -1,7 +1,7 @@
 """Methods of identification: one file a method. `METHODS` names them.
 
-To add one, write its file (a function of records and `Options`, and METHOD) and add its name to the tuple: the command
-line, `stickslip.identify` and the tests then include it.
+To add one, write its file (a function of records and `Options`, and METHOD, which names the options that it uses) and
+add its name to the tuple: the command line, `stickslip.identify` and the tests then include it.
 """
 
 from __future__ import annotations
@@ -38,3 +38,12 @@ def method_named(name: str) -> Method:
         raise UnknownName("method", name, METHODS)
     found: Method = importlib.import_module(f"stickslip.identify.methods.{name}").METHOD
     return found
+
+
+def methods_by_option() -> dict[str, list[str]]:
+    """Return the names of the methods that use an option, by the option's name."""
+    out: dict[str, list[str]] = {}
+    for name in METHODS:
+        for option in method_named(name).uses:
+            out.setdefault(option, []).append(name)
+    return out

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import kind_of_loop, split_loop
-from stickslip.errors import InputError, UnknownName
+from stickslip.errors import InputError
 from stickslip.identify.experiment import DRIVES, Experiment, experiment_of
+from stickslip.identify.methods._records import MOTORS, with_extra
 from stickslip.identify.methods.method import Options
 from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Loop
 
-MOTORS = ("torque_constant", "force_constant")
 BESIDE_GAINS = ("limit", "filter", "period", "count", "span")
 NOT_NEGATIVE = (*Gains._fields, *Cascade._fields, "filter", "period", "count")
 RANGES = {"limit": "greater than 0", **dict.fromkeys(NOT_NEGATIVE, "a finite number of 0 or more")}
@@ -98,22 +98,13 @@ def experiment(record: Record, axis: ServoAxis, options: Options) -> Experiment:
     output = options.loop_output or ("torque" if options.resistance is None else "voltage")
     if recorded or output != "voltage":  # a signal in V or A is what it is, whatever supplies it
         record = replace(record, channels={k: v for k, v in record.channels.items() if k != "supply"})
-    if options.extra_torque:
-        record = with_extra(record, options.extra_torque, loop)
-    return experiment_of(record, axis, loop=loop_of(loop) if loop else None, name=name, output=output)
-
-
-def with_extra(record: Record, channel: str, loop: str) -> Record:
-    """The record with a known torque added to the recorded one."""
-    if channel not in record.channels:
-        raise UnknownName("channel of --extra-torque", channel, sorted(record.channels))
-    if loop or "motor_torque" not in record.channels:
+    if options.extra_torque and (loop or "motor_torque" not in record.channels):
         why = "the loop that --loop simulates would not make it" if loop else "no torque is recorded"
         raise InputError(
-            f"--extra-torque {channel} is added to the recorded torque, but {why}; leave one out"
+            f"--extra-torque {options.extra_torque} is added to the recorded torque, but {why}; leave one out"
         )
-    total = record["motor_torque"] + record[channel]
-    return replace(record, channels={**record.channels, "motor_torque": total})
+    record = with_extra(record, options.extra_torque, "motor_torque")
+    return experiment_of(record, axis, loop=loop_of(loop) if loop else None, name=name, output=output)
 
 
 def loop_of(given: str | Mapping[str, float | str]) -> Loop:

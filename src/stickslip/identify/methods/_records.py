@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from stickslip.errors import InputError, UnknownName
+from stickslip.identify.experiment import TORQUES
 from stickslip.identify.methods.method import Options
 from stickslip.record import Record
 
-TORQUES = ("motor_torque", "torque", "sensor_torque", "friction_torque")
+MOTORS = ("torque_constant", "force_constant")
 CURVE = ("fs", "fc", "vs", "delta_s", "sigma2")
 
 
@@ -29,11 +31,56 @@ def torque_channel(records: Sequence[Record], options: Options, method: str) -> 
     )
 
 
+def with_extra(record: Record, extra: str, torque: str) -> Record:
+    """Return the record with the channel `extra` (empty: none) added to the channel `torque`.
+
+    Raises
+    ------
+    UnknownName, InputError
+        If the record has no such channel, or it has another unit.
+    """
+    if not extra:
+        return record
+    if extra not in record.channels:
+        raise UnknownName("channel of --extra-torque", extra, sorted(record.channels))
+    units = record.units[torque], record.units[extra]
+    if extra == torque or units[0] != units[1]:
+        why = "that torque itself" if extra == torque else f"in {units[1]}"
+        raise InputError(
+            f"--extra-torque {extra} is added to {torque}, in {units[0]}, but it is {why}; name another channel"
+        )
+    return replace(record, channels={**record.channels, torque: record[torque] + record[extra]})
+
+
+def with_torque(records: Sequence[Record], options: Options, method: str) -> tuple[list[Record], str]:
+    """Return the records, a known extra torque added, and the channel of their torque."""
+    channel = torque_channel(records, options, method)
+    return [with_extra(r, options.extra_torque, channel) for r in records], channel
+
+
+def refuse_idle_motor(records: Sequence[Record], options: Options) -> None:
+    """Refuse a motor's constant that nothing is multiplied by, since a torque is recorded.
+
+    Raises
+    ------
+    InputError
+    """
+    if any("motor_torque" in r.meta.get("derived", {}) for r in records):
+        return
+    for name in MOTORS:
+        if (value := getattr(options, name)) is not None:
+            raise InputError(
+                f"--{name.replace('_', '-')} {value:g} would not be used: the torque is recorded; leave it out, or "
+                "map the current alone (--map current=COLUMN --map motor_torque=none)"
+            )
+
+
 def has_torque(method: str) -> Callable[[Sequence[Record], Options], None]:
     """The check of a method: every record has a torque."""
 
     def check(records: Sequence[Record], options: Options) -> None:
-        torque_channel(records, options, method)
+        with_torque(records, options, method)
+        refuse_idle_motor(records, options)
 
     return check
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
-from stickslip.identify.methods._records import has_torque, single, torque_channel
-from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.methods._records import has_torque, single, with_torque
+from stickslip.identify.methods.method import TORQUE, Method, Options
 from stickslip.identify.presliding.attraction import identify_attraction
 from stickslip.identify.presliding.hysteresis import Loop
 from stickslip.record import Record
@@ -23,7 +23,8 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
         )
     if "velocity" not in record.channels:
         raise InputError("--method attraction needs the velocity; map a column with --map velocity=COLUMN")
-    loop = Loop.of(record, torque_channel(records, options, "attraction"), "velocity")
+    (record,), channel = with_torque([record], options, "attraction")
+    loop = Loop.of(record, channel, "velocity")
     return identify_attraction(loop, model, noise=options.noise)
 
 
@@ -32,5 +33,6 @@ METHOD = Method(
     "GMS's attraction from a motion in one direction",
     identify,
     has_torque("attraction"),
+    uses=TORQUE | {"model", "noise"},
     values=(),
 )

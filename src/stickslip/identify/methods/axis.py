@@ -19,7 +19,7 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import frozen_by_default
 from stickslip.identify.methods._experiments import driven, experiments_of
 from stickslip.identify.methods._play import with_dead_travel
-from stickslip.identify.methods.method import Method, Options, law_of, refuse_unsaid
+from stickslip.identify.methods.method import AXIS, Method, Options, law_of, refuse_unsaid
 from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
@@ -92,16 +92,33 @@ def refuse_for_every_law(axis: ServoAxis, experiments: Sequence[Experiment], opt
     refuse_unsaid(options, neutral | own)
 
 
-METHOD = Method("axis", "inertia, offset or gravity and friction jointly", identify, driven, holds_out=True)
+MOTION = AXIS | {"held_out", "inverse", "per_direction", "harmonics", "position_map", "torque_is", "delay"}
+"""Options of both ways to identify an axis."""
+LEAST_SQUARES = MOTION | {"laws", "values", "frozen", "inertia"}
+"""Options of the plain inverse dynamics, some of which it refuses with a reason of its own."""
+METHOD = Method(
+    "axis", "inertia, offset or gravity and friction jointly", identify, driven,
+    uses=LEAST_SQUARES | {"free", "load", "intervals", "robust"}, narrowed={"inverse": LEAST_SQUARES},
+)  # fmt: skip
 
 
 def refuse_held(options: Options) -> None:
-    """Refuse values that are known where every number is fitted.
+    """Refuse what the plain inverse dynamics, which fits every number of one law, would ignore.
 
     Raises
     ------
     InputError
     """
+    others = [law for law in (x if isinstance(x, str) else x.name for x in options.laws) if law != "coulomb"]
+    if others:
+        raise InputError(
+            f"the plain inverse dynamics (--inverse) fits law coulomb only, not {', '.join(others)}; leave out "
+            "--inverse, or --law"
+        )
+    if started := [name for name in options.values if name not in options.frozen]:
+        raise InputError(
+            f"the plain inverse dynamics (--inverse) has no start: --set {started[0]} would be ignored; leave it out"
+        )
     if options.frozen:
         raise InputError(
             f"the plain inverse dynamics (--inverse) fits every number: {', '.join(options.frozen)} cannot be held "

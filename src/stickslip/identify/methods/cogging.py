@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.cogging import identify_cogging
 from stickslip.identify.estimate import Identification
-from stickslip.identify.methods._records import TORQUES
-from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.experiment import TORQUES
+from stickslip.identify.methods._records import with_extra
+from stickslip.identify.methods.method import TORQUE, Method, Options
 from stickslip.record import Record
 
 GEAR = "gear_ratio"
@@ -30,9 +31,9 @@ def channel_of(records: Sequence[Record], options: Options) -> str:
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """Even and odd part of the torque over the angle."""
-    return identify_cogging(
-        records, torque=channel_of(records, options), gear=gear_of(options), progress=options.progress
-    )
+    channel = channel_of(records, options)
+    records = [with_extra(r, options.extra_torque, channel) for r in records]
+    return identify_cogging(records, torque=channel, gear=gear_of(options), progress=options.progress)
 
 
 def gear_of(options: Options) -> float:
@@ -55,5 +56,6 @@ def check(records: Sequence[Record], options: Options) -> None:
 
 
 METHOD = Method(
-    "cogging", "torque over the angle: cogging, and friction by angle", identify, check, takes_current=True
-)
+    "cogging", "torque over the angle: cogging, and friction by angle", identify, check,
+    uses=TORQUE | {"values"}, takes_current=True,
+)  # fmt: skip

@@ -9,8 +9,8 @@ import numpy as np
 
 from stickslip.errors import UnknownName
 from stickslip.identify.estimate import Identification
-from stickslip.identify.methods._records import has_torque, single, torque_channel
-from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.methods._records import has_torque, single, with_torque
+from stickslip.identify.methods.method import TORQUE, Method, Options
 from stickslip.identify.presliding.hysteresis import Loop, choose_hysteresis, templates_for
 from stickslip.record import Record
 
@@ -20,7 +20,8 @@ ROWS = 8000
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """The law that says best what blocks left out hold."""
-    whole = Loop.of(single(records, "hysteresis"), torque_channel(records, options, "hysteresis"))
+    (record,), channel = with_torque([single(records, "hysteresis")], options, "hysteresis")
+    whole = Loop.of(record, channel)
     every = max(1, whole.time.size // ROWS)
     loop = Loop(whole.time[::every], whole.position[::every], whole.torque[::every], whole.unit)
     templates = templates_for(loop, np.arange(loop.time.size))
@@ -47,5 +48,6 @@ METHOD = Method(
     "a law along the motion, from measured friction",
     identify,
     has_torque("hysteresis"),
+    uses=TORQUE | {"laws"},
     values=(),
 )

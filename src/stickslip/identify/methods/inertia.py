@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from stickslip.identify.estimate import Identification
 from stickslip.identify.methods._experiments import driven, experiments_of
-from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.methods.method import AXIS, Method, Options
 from stickslip.identify.response.inertia import inertia
 from stickslip.record import Record
 
@@ -17,4 +17,6 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     return inertia(experiments, axis)
 
 
-METHOD = Method("inertia", "inertia from the frequency response", identify, driven, values=())
+METHOD = Method(
+    "inertia", "inertia from the frequency response", identify, driven, uses=AXIS - {"pendulum"}, values=()
+)

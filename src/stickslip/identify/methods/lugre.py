@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
-from stickslip.identify.methods._records import CURVE, curve_values, has_torque, single, torque_channel
-from stickslip.identify.methods.method import Method, Options
+from stickslip.identify.methods._records import CURVE, curve_values, has_torque, single, with_torque
+from stickslip.identify.methods.method import TORQUE, Method, Options
 from stickslip.identify.presliding.lugre_dynamics import Response, identify_lugre_dynamics
 from stickslip.record import Record
 
@@ -17,7 +17,8 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     record = single(records, "lugre")
     if "inertia" not in options.values:
         raise InputError("--method lugre needs the inertia in kg·m²; give --set inertia=...")
-    response = Response.of(record, torque_channel(records, options, "lugre"))
+    (record,), channel = with_torque([record], options, "lugre")
+    response = Response.of(record, channel)
     curve = curve_values(options, "lugre")
     return identify_lugre_dynamics(response, options.values["inertia"], curve, noise=options.noise)
 
@@ -27,5 +28,6 @@ METHOD = Method(
     "LuGre's stiffness and damping from stick-slip",
     identify,
     has_torque("lugre"),
+    uses=TORQUE | {"values", "inertia", "model", "noise"},
     values=(*CURVE, "inertia"),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Literal
 
 from stickslip import plugins
@@ -93,6 +93,43 @@ class Options:
             )
 
 
+OWN_FLAGS = {
+    "laws": "law", "values": "set", "frozen": "freeze", "held_out": "hold-out", "position_map": "position",
+}  # fmt: skip
+"""Options whose name on the command line is another than that of their field."""
+OF_EVERY_METHOD = ("torque_constant", "force_constant", "regress", "progress")
+"""Fields that no method refuses: how a log is read, and how it is computed."""
+AXIS = frozenset({"pendulum", "drive_gain", "resistance", "loop", "loop_output", "extra_torque"})
+"""Options that turn a record into an experiment of an axis."""
+TORQUE = frozenset({"torque", "extra_torque"})
+"""Options of every method that reads a torque from records."""
+
+
+def flag_of(option: str) -> str:
+    """Return what the command line calls an option."""
+    return f"--{OWN_FLAGS.get(option, option).replace('_', '-')}"
+
+
+def given_in(options: Options, *, inertia: bool, loop: bool, hold_out: bool) -> tuple[str, ...]:
+    """Return the names of the options that differ from their defaults.
+
+    ``inertia``, ``loop`` and ``hold_out`` are given apart from `options`, which have them among other things.
+    """
+    neutral = Options()
+    own = {f.name for f in fields(Options)} - {*OF_EVERY_METHOD, "held_out"}
+    changed = [
+        f.name
+        for f in fields(Options)
+        if f.name in own and getattr(options, f.name) != getattr(neutral, f.name)
+    ]
+    if inertia:
+        # It is among the values, and of an axis among the frozen ones.
+        alone = {"values": set(options.values) <= {"inertia"}, "frozen": set(options.frozen) <= {"inertia"}}
+        changed = [name for name in changed if not alone.get(name, False)]
+    apart = (("inertia", inertia), ("loop", loop), ("held_out", hold_out))
+    return (*changed, *(name for name, given in apart if given))
+
+
 @dataclass(frozen=True)
 class Method:
     """One way to identify.
@@ -104,8 +141,12 @@ class Method:
         ``identify(records, options) -> Identification``.
     check : callable
         ``check(records, options)`` refuses, before anything is computed, records that lack what it needs.
-    holds_out : bool
-        Whether records may judge the result instead of being fitted.
+    uses : frozenset of str
+        Names of the options that it uses: fields of `Options`, ``loop`` and ``inertia``. Others are refused.
+    narrowed : mapping of str to frozenset of str
+        By the name of an option: the options that the method uses if that one is given.
+    takes_steady_points : bool
+        Whether a table of velocities and torques without times will do.
     takes_current : bool
         Whether a current without a torque constant will do.
     values : tuple of str, or None
@@ -117,9 +158,36 @@ class Method:
     title: str
     identify: Callable[[Sequence[Record], Options], Identification]
     check: Callable[[Sequence[Record], Options], None]
-    holds_out: bool = False
+    uses: frozenset[str] = frozenset()
+    narrowed: Mapping[str, frozenset[str]] = field(default_factory=dict[str, frozenset[str]])
+    takes_steady_points: bool = False
     takes_current: bool = False
     values: tuple[str, ...] | None = None
+
+    def refuse_unused(self, given: Sequence[str], elsewhere: Mapping[str, Sequence[str]]) -> None:
+        """Refuse options that would be ignored.
+
+        Parameters
+        ----------
+        given : sequence of str
+            Names of the options that were given.
+        elsewhere : mapping of str to sequence of str
+            By option: the methods that use it.
+
+        Raises
+        ------
+        InputError
+        """
+        for name in given:
+            if name not in self.uses:
+                others = elsewhere.get(name, ())
+                by = f" (methods that do: {', '.join(others)})" if others else ""
+                raise InputError(f"--method {self.name} does not use {flag_of(name)}{by}; leave it out")
+        for narrowing, uses in self.narrowed.items():
+            unused = [name for name in given if name not in uses] if narrowing in given else []
+            if unused:
+                one, other = flag_of(narrowing), flag_of(unused[0])
+                raise InputError(f"{one} does not use {other}; leave out one of them")
 
     def refuse_unknown(self, options: Options) -> None:
         """Refuse what is set, free or frozen and would go unheard.

@@ -9,43 +9,91 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip.errors import InputError, UnknownName
+from stickslip.identify.doctor.steady_table import NOTES, is_steady_table
 from stickslip.identify.estimate import Identification
 from stickslip.identify.fit.axis_start import each_way, frozen_by_default, starts
-from stickslip.identify.methods._records import has_torque, torque_channel
-from stickslip.identify.methods.method import Method, Options, law_of, refuse_unsaid
-from stickslip.identify.sliding.choice import candidates, choose_sliding
+from stickslip.identify.methods._records import has_torque, with_torque
+from stickslip.identify.methods.method import TORQUE, Method, Options, law_of, refuse_unsaid
+from stickslip.identify.sliding.choice import candidates, choose_sliding, comparable
 from stickslip.identify.sliding.curve import Array, identify_sliding
-from stickslip.identify.sliding.offset import beside, constant_torque, without
+from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.identify.sliding.segments import sliding_points
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.spec import Law
 
+FEW = "Coulomb with viscous friction was fitted: these points are too few to choose among several curves."
+PER_DIRECTION = "Friction of each direction includes any constant torque: --per-direction holds offset at 0."
+
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """A curve of the laws asked for, where none is named, of those of the thesis; and the constant torque beside it."""
+    """Fit the laws named, or the curves of the thesis, together with a constant torque; choose one of several."""
     if options.per_direction and not options.laws:
         raise InputError("--method sliding --per-direction needs a law; name one, such as --law coulomb")
-    measured, notes = sliding_points(records, torque=torque_channel(records, options, "sliding"))
-    # With levels of its own for each direction a law takes up what a constant torque would.
-    constant = None if options.per_direction else constant_torque(measured)
-    points = without(measured, constant)
+    records, channel = with_torque(records, options, "sliding")
+    measured, notes = points_in(records, channel)
+    points = replace(measured, offset=known_offset(measured, options))
     if options.laws:
         laws = [law_of(given) for given in options.laws]
         laws = [each_way(law) for law in laws] if options.per_direction else laws
         templates = {law.name: template(law, points.velocity, points.torque, options) for law in laws}
     else:
-        templates = candidates(points.velocity, points.torque, dict(options.values))
+        every = candidates(points.velocity, points.torque, dict(options.values))
+        templates = comparable(points, every)
+        notes = (*notes, FEW) if len(templates) < len(every) else notes
     refuse_unknown(options, templates.values())
-    frozen = list(options.frozen)
+    frozen = [name for name in options.frozen if name != "offset"]
     if len(templates) > 1:
         found = choose_sliding(
             points, templates, noise=options.noise, frozen=frozen, progress=options.progress
         )[1]
     else:
         found = identify_sliding(points, next(iter(templates.values())), noise=options.noise, frozen=frozen)
-    found = beside(found, constant)
-    return replace(found, notes=(*notes, *found.notes))
+    said = [PER_DIRECTION] if options.per_direction and "offset" not in options.frozen else []
+    return replace(found, notes=(*notes, *said, *found.notes))
+
+
+def points_in(records: Sequence[Record], torque: str) -> tuple[SlidingPoints, tuple[str, ...]]:
+    """Return the points of the records: rows of tables, averages over constant velocities of logs; and notes.
+
+    Raises
+    ------
+    InputError
+        If tables and logs are mixed.
+    """
+    tables = [r for r in records if is_steady_table(r)]
+    if not tables:
+        return sliding_points(records, torque=torque)
+    if len(tables) < len(records):
+        raise InputError(
+            "--method sliding takes either logs with times or tables of steady points; give them apart"
+        )
+    velocity, effort = (np.concatenate([r[name] for r in tables]) for name in ("velocity", torque))
+    linear = tables[0].units["velocity"] == "m/s"
+    unit = "m/s" if linear else "rad/s"
+    reach = f"{float(np.min(velocity)):.3g} to {float(np.max(velocity)):.3g} {unit}"
+    said = [f"{text[0].upper()}{text[1:]}." for r in tables for text in r.meta[NOTES]]
+    return SlidingPoints(velocity, effort), (f"{velocity.size} steady points of a table, {reach}.", *said)
+
+
+def known_offset(points: SlidingPoints, options: Options) -> float | None:
+    """Return the constant torque that the user gave, N·m; None if it is to be fitted.
+
+    With friction parameters for each direction it is 0 unless it was given: it cannot be distinguished from them.
+
+    Raises
+    ------
+    InputError
+        If parameters for each direction are to be fitted and the points are of one.
+    """
+    if options.per_direction and points.one_way:
+        raise InputError(
+            "--per-direction needs constant velocities in both directions, and the record has one; leave it out, or "
+            "move in both directions"
+        )
+    if "offset" in options.frozen and "offset" in options.values:
+        return options.values["offset"]
+    return 0.0 if options.per_direction else None
 
 
 def refuse_unknown(options: Options, templates: Iterable[Model]) -> None:
@@ -56,7 +104,7 @@ def refuse_unknown(options: Options, templates: Iterable[Model]) -> None:
     ------
     UnknownName, InputError
     """
-    names = {f.name for model in templates for f in model.law.fields}
+    names = {"offset", *(f.name for model in templates for f in model.law.fields)}
     for name in (*options.values, *options.frozen):
         if name.partition("[")[0] not in names:
             raise UnknownName("parameter of --method sliding", name, names)
@@ -74,4 +122,7 @@ def template(law: Law, velocity: Array, torque: Array, options: Options) -> Mode
     return starts(law, float(np.median(np.abs(torque))), 0.0, speed, 1.0, known)[0]
 
 
-METHOD = Method("sliding", "sliding curve from constant velocities", identify, has_torque("sliding"))
+METHOD = Method(
+    "sliding", "sliding curve from constant velocities", identify, has_torque("sliding"),
+    uses=TORQUE | {"laws", "values", "frozen", "free", "noise", "per_direction"}, takes_steady_points=True,
+)  # fmt: skip

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.errors import InputError
 from stickslip.identify.fit.shifts import Whole, least_between, shifts_looked_at
 from stickslip.identify.fit.smooth import Window, seen
 from stickslip.identify.regression.band_fit import BandFit, fit_band
@@ -23,7 +22,14 @@ from stickslip.identify.regression.flexible import GIVES, HARDLY, SWINGS, Train,
 from stickslip.identify.regression.number import QUANTILE, Number
 from stickslip.identify.regression.orders import Shown, candidate_orders, goes_round, shown_orders
 from stickslip.identify.regression.rebuilding import rebuilding_way
-from stickslip.identify.regression.sliding_rows import FEWEST, Fall, Signals, SlidingRows, sliding_rows
+from stickslip.identify.regression.sliding_rows import (
+    FEWEST,
+    Fall,
+    Signals,
+    SlidingRows,
+    TooLittleSliding,
+    sliding_rows,
+)
 from stickslip.identify.regression.strokes import stacked
 from stickslip.identify.regression.together import telling, together
 from stickslip.machines.servo import ServoAxis
@@ -161,7 +167,7 @@ def seen_wider(signals: Sequence[Signals], wider: float, width: float, *ask: Any
     """What windows so many times wider show; nothing where they are too wide for two bands."""
     try:
         other = in_bands(signals, wider * width, *ask, exponents=GAUSSIAN)
-    except InputError:
+    except TooLittleSliding:
         return None
     return replace(other, widened=wider) if len(other.fits) > 1 else None
 
@@ -196,7 +202,7 @@ def in_bands(
     """Fits from the widest band of frequencies to the narrowest, friction falling with one of these exponents."""
     bands: list[BandFit] = []
     first: Widest | None = None
-    lacking = InputError("no band of the record slides long enough in one direction")
+    lacking = TooLittleSliding("no band of the record slides long enough in one direction")
     for factor in BANDS:
         try:
             if first is None:
@@ -206,7 +212,7 @@ def in_bands(
             skew = bands[0].numbers["skew"].value
             rows, falls, *_ = rows_of(signals, factor * width, skew, exponents, math.inf)
             bands.append(fit_band(rows, falls, **first.others))
-        except InputError as error:
+        except TooLittleSliding as error:
             lacking = error
     if first is None:
         raise lacking
@@ -371,7 +377,7 @@ def rows_of(
     rows = [r.falling_at(falls).farther(way) for r in first]
     rows = [r for r in rows if r.time.size >= FEWEST]
     if not rows:
-        raise InputError("friction is rebuilt over the whole of every stroke; record longer strokes")
+        raise TooLittleSliding("friction is rebuilt over the whole of every stroke; record longer strokes")
     creep = creep_of(rows, skew)
     faster = [r for r in (r.faster(creep.speed) for r in rows) if r.time.size >= FEWEST]
     if not faster or creep is NOWHERE:

@@ -7,11 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from stickslip.errors import InputError
 from stickslip.identify.regression.band_system import USUAL_EXPONENTS
 from stickslip.identify.regression.bands import GAUSSIAN, Bands, calmed, in_bands
 from stickslip.identify.regression.drifting import same_motion, usual_speed
-from stickslip.identify.regression.sliding_rows import Signals
+from stickslip.identify.regression.sliding_rows import Signals, TooLittleSliding
 from stickslip.identify.regression.together import together
 from stickslip.machines.servo import ServoAxis
 
@@ -46,7 +45,7 @@ def beside_drift(
         return found
     exponents = GAUSSIAN if found.widened > 1.0 else tuple(USUAL_EXPONENTS)
     beside = {**options, "drifting": True, "train": found.train}
-    with contextlib.suppress(InputError):
+    with contextlib.suppress(TooLittleSliding):
         other = in_bands(signals, found.widened * width, axis, beside, *ask, exponents=exponents)
         if shows_a_drift(other):
             return replace(other, widened=found.widened)

@@ -11,7 +11,7 @@ Where the record is irregular it is put on a regular grid first.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -120,6 +120,7 @@ def inverse_dynamics(
     cutoff: float | None = None,
     harmonics: int = 0,
     harmonic_period: float = 2.0 * math.pi,
+    held: Mapping[str, float] | None = None,
 ) -> InverseDynamics:
     """Identify an axis by linear least squares on its inverse dynamics.
 
@@ -136,6 +137,8 @@ def inverse_dynamics(
         Harmonics of a torque that depends on the position.
     harmonic_period : float
         rad (m) after which it repeats.
+    held : mapping of str to float, optional
+        Values of parameters, by name, that are known and not fitted; their variance is 0.
 
     Returns
     -------
@@ -155,25 +158,32 @@ def inverse_dynamics(
     names, units = _names(axis, per_direction, harmonics)
     w = np.concatenate([c.matrix for c in columns])
     y = np.concatenate([c.torque for c in columns])
-    if y.size < 3 * len(names):
+    known = {n: x for n, x in (held or {}).items() if n in names}
+    fitted = [i for i, n in enumerate(names) if n not in known]
+    if y.size < 3 * len(fitted):
         raise InputError(
             f"{sum(t.time.size for t in experiments)} samples hold {y.size} independent ones in motion (the filters "
-            f"take {TAPER / corner:.2g} s at both ends of a record), too few for {len(names)} parameters; give a "
-            "longer record with more motion"
+            f"take {TAPER / corner:.2g} s at both ends of a record), too few for {len(fitted)} parameters; give a "
+            "longer record with more motion, or one with rows more often"
         )
-    size = np.linalg.norm(w, axis=0)
-    rank = np.linalg.matrix_rank(w / np.where(size > 0.0, size, 1.0), tol=1e-8)
-    if rank < len(names):
+    free = w[:, fitted]
+    size = np.linalg.norm(free, axis=0)
+    rank = np.linalg.matrix_rank(free / np.where(size > 0.0, size, 1.0), tol=1e-8)
+    if rank < len(fitted):
+        tied = _undetermined([names[i] for i in fitted], free, size)
         raise InputError(
-            f"inverse dynamics: {_undetermined(names, w, size)} in this motion; "
-            "record both directions and several speeds"
+            f"inverse dynamics: {tied} in this motion; record both directions and several speeds{_level(tied)}"
         )
-    values: Array = np.linalg.lstsq(w, y, rcond=None)[0].astype(np.float64)
+    values: Array = np.array([known.get(n, 0.0) for n in names], dtype=np.float64)
+    values[fitted] = np.linalg.lstsq(free, y - w @ values, rcond=None)[0]
     residual = y - w @ values
-    inverse, _ = inverse_information(w)
-    variance = float(residual @ residual) / (y.size - len(names))
+    inverse, robust = np.zeros((len(names), len(names))), np.zeros((len(names), len(names)))
+    block = np.ix_(fitted, fitted)
+    own, _ = inverse_information(free)
+    variance = float(residual @ residual) / (y.size - len(fitted))
     lags = correlation_lags(residual)
-    robust = inverse @ long_run(w * residual[:, None], lags) @ inverse
+    inverse[block] = own
+    robust[block] = own @ long_run(free * residual[:, None], lags) @ own
     return InverseDynamics(
         names, units, values, np.sqrt(variance * np.diag(inverse)), np.sqrt(np.diag(robust)), robust,
         float(np.linalg.norm(residual) / np.linalg.norm(y)), corner, BAND_PER_CUTOFF * corner, w, y, residual,
@@ -190,6 +200,11 @@ def _undetermined(names: Sequence[str], w: Array, size: Array) -> str:
     without = np.abs(np.linalg.svd(w / size, full_matrices=False)[2][-1])
     tied = [n for n, part in zip(names, without, strict=True) if part > 0.1 * without.max()]
     return f"the effects of {', '.join(tied[:-1])} and {tied[-1]} cannot be distinguished"
+
+
+def _level(tied: str) -> str:
+    """What else separates friction from a constant torque, if these are not distinguished."""
+    return ", or give --freeze offset=0 if no constant torque acts (a level axis)" if "offset" in tied else ""
 
 
 def refuse_harmonics(experiments: Sequence[Experiment], harmonics: int, *, simulated: bool = False) -> None:

@@ -36,6 +36,10 @@ KEPT = 2_000_000  # numbers of falls laid out that are kept for another look, at
 VANISHED = 700.0  # exponent beyond which a fall of friction is 0
 
 
+class TooLittleSliding(InputError):
+    """A record has too little gross sliding for a window: another window, or none, is then used."""
+
+
 class Fall(NamedTuple):
     """How friction falls with velocity: as exp(-|v/vs|^exponent); vs in rad/s (m/s)."""
 
@@ -136,14 +140,14 @@ def narrowest_width(signals: Signals) -> float:
 
     Raises
     ------
-    InputError
+    TooLittleSliding
         If that window is long beside the record.
     """
     width = max(NARROWEST * signals.period, CORNER / HIGHEST_CORNER)
     seconds = signals.time.size * signals.period
     while True:
         if width > WIDEST * seconds:
-            raise InputError(
+            raise TooLittleSliding(
                 f"the position is so coarse that gross sliding shows over {width:.2g} s alone, and the record lasts "
                 f"{seconds:.3g} s; record faster motion, or a finer position"
             )
@@ -276,7 +280,7 @@ def sliding_rows(signals: Signals, window: Window) -> SlidingRows:
 
     Raises
     ------
-    InputError
+    TooLittleSliding
         If there are hardly any.
     """
     if window not in signals.kept:
@@ -298,7 +302,7 @@ def seen_through(signals: Signals, window: Window) -> SlidingRows:
     stride = stride_of(window)
     places = np.flatnonzero(clear[::stride]) * stride
     if places.size < FEWEST:
-        raise InputError(
+        raise TooLittleSliding(
             f"too little gross sliding: it lasts {longest_run(~doubtful) * period:.3g} s at a time at most, of which "
             f"{places.size * stride * period:.3g} s in all are far enough from reversals and stops for a window of "
             f"{2 * window.reach * period:.3g} s; record longer motion in one direction, a finer position, or rows "

@@ -19,15 +19,20 @@ from stickslip.identify.sliding.curve import (
     fit_sliding,
     identify_sliding,
     model_of,
-    steady_vector,
 )
+from stickslip.identify.sliding.torques import Torques, steady_vector
 from stickslip.model import Model
-from stickslip.simulation.prescribed.steady import Steady
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+COULOMB = "Coulomb with viscous"
+"""The candidate that any contact has at least."""
 FOLD_REACH = 10.0
 """Factor within which a parameter of a fit to a part of the points stays around that of the fit to all."""
+FOLD_EXPONENT = 2.0
+"""The same of an exponent: ten times that of a power of the velocity leaves every scale at the next faster point."""
+SPARE = 2
+"""Points more than parameters that a curve needs to be compared with others."""
 ALIKE = 0.01
 """Difference in AICc below which two laws fit alike."""
 
@@ -67,7 +72,7 @@ def candidates(velocity: Array, torque: Array, known: Mapping[str, float] | None
     }
     shapes: dict[str, tuple[str, dict[str, str], dict[str, float]]] = {
         "viscous (eq. 2.3)": ("viscous", {}, linear),
-        "Coulomb with viscous": ("coulomb", {}, {"fc": level, **linear}),
+        COULOMB: ("coulomb", {}, {"fc": level, **linear}),
         "Stribeck (eq. 2.6)": ("stribeck_plain", {}, {**stribeck, "delta_s": 1.5, **linear}),
         "two exponentials (eq. 4.4)": (
             "stribeck_plain", {"curve": "double_exponential", "viscous": "power"}, {**exponentials, **power},
@@ -81,6 +86,12 @@ def candidates(velocity: Array, torque: Array, known: Mapping[str, float] | None
         name: Model(law, choices, **{n: given.get(n, value) for n, value in values.items()})
         for name, (law, choices, values) in shapes.items()
     }
+
+
+def comparable(points: SlidingPoints, templates: Mapping[str, Model]) -> dict[str, Model]:
+    """Return the candidates; of points too few for Coulomb friction to be compared with others, it alone."""
+    count = steady_vector(points, templates[COULOMB], ()).size
+    return {COULOMB: templates[COULOMB]} if len(points) < count + SPARE else dict(templates)
 
 
 def choose_sliding(
@@ -118,14 +129,17 @@ def choose_sliding(
         Per template: parameters, rms_Nm, aicc, bic, cross_validated_Nm. Templates with more parameters than points
         can tell are left out.
     """
-    level = default_noise(points, noise)
+    level, whole = default_noise(points, noise), points
+    if points.offset is None and points.one_way:
+        # A constant torque would take the place of Coulomb friction, and the law without a level would be chosen.
+        points = replace(points, offset=0.0)
     laws = candidates(points.velocity, points.torque) if templates is None else templates
     kept = {name: [n for n in frozen if n in t.parameters._fields] for name, t in laws.items()}
     table: dict[str, dict[str, float]] = {}
     for number, (name, template) in enumerate(laws.items(), 1):
         progress(f"{name}: curve {number} of {len(laws)}")
         count = steady_vector(points, template, kept[name]).size
-        if count == 0 or len(points) < count + 2:
+        if count == 0 or len(points) < count + SPARE:
             continue
         found = fit_sliding(points, template, level, kept[name], starts, profiles=False)
         scores = criteria(found.optimum.cost, len(points), count, level)
@@ -147,7 +161,7 @@ def choose_sliding(
         )
     chosen = _best(table, len(points), laws)
     progress(f"{chosen}: intervals")
-    result = identify_sliding(points, laws[chosen], noise=level, frozen=kept[chosen], starts=starts)
+    result = identify_sliding(whole, laws[chosen], noise=level, frozen=kept[chosen], starts=starts)
     details = {**result.details, "chosen": chosen, "comparison": table}
     return (
         chosen,
@@ -170,14 +184,15 @@ def left_out_error(
 ) -> Array:
     """Weighted errors at some points of the curve fitted to the others."""
     # Fewer points may leave a parameter open that all of them close: it must not run off and blow the error up.
-    limits = {
-        p.name: (p.value / FOLD_REACH, p.value * FOLD_REACH)
-        for p in steady_vector(points, template, frozen).free if p.logarithmic and p.value > 0.0
-    }  # fmt: skip
+    limits: dict[str, tuple[float, float]] = {}
+    for p in steady_vector(points, template, frozen).free:
+        reach = FOLD_EXPONENT if p.par.unit == "-" else FOLD_REACH
+        if p.logarithmic and p.value > 0.0:
+            limits[p.name] = (p.value / reach, p.value * reach)
     found = fit_sliding(points.only(fitted), template, None, frozen, 2, profiles=False, limits=limits)
     rest = points.only(left_out)
-    steady = Steady(template.law, rest.velocity, rest.side)
-    return points.weight[left_out] * (steady.torque(found.vector.packed(found.u)) - rest.torque)
+    torques = Torques(found.vector, rest.velocity, rest.side)
+    return points.weight[left_out] * (torques.at(found.u) - rest.torque)
 
 
 def _best(table: Mapping[str, Mapping[str, float]], n: int, laws: Mapping[str, Model]) -> str:

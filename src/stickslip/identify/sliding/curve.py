@@ -22,10 +22,11 @@ from stickslip.identify.fit.noise import Noise, as_noise, noise_of_repeats
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.fit.selection import criteria
 from stickslip.identify.fit.uncertainty import Fit, fit
-from stickslip.identify.sliding.curve_pictures import curve_picture, law_of, listed, residual_picture
+from stickslip.identify.sliding.curve_pictures import curve_picture, listed, residual_picture
+from stickslip.identify.sliding.offset import apart_from_friction, details_of, with_unknown_offset
 from stickslip.identify.sliding.points import SlidingPoints
+from stickslip.identify.sliding.torques import Torques, steady_vector, tied_to_offset, vector_of
 from stickslip.model import Model
-from stickslip.simulation.prescribed.steady import Steady
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -48,21 +49,6 @@ def default_noise(points: SlidingPoints, noise: Noise | float | None) -> Noise |
     return own if repeats is None or own.std > repeats.std else repeats
 
 
-def steady_vector(points: SlidingPoints, template: Model, frozen: Iterable[str]) -> Vector:
-    """The template's parameters that act at these velocities free, the others frozen."""
-    vector = Vector(template, frozen=frozen)
-    steady = Steady(template.law, points.velocity, points.side)
-    here = steady.torque(vector.packed(vector.start))
-    idle: list[str] = []
-    for p in vector.free:
-        changed = replace(p, value=p.value * 1.1 if p.value else 0.1 * p.scale)
-        values = {q.name: changed.value if q.name == p.name else q.value for q in vector.free}
-        moved = steady.torque(vector.packed(vector.coordinates(values)))
-        if p.shares or float(np.max(np.abs(moved - here))) <= 1e-12 * float(np.max(np.abs(here))):
-            idle.append(p.name)
-    return Vector(template, frozen=[*frozen, *idle])
-
-
 def untouched_parameters(template: Model, frozen: Iterable[str], vector: Vector) -> list[str]:
     """Parameters that nobody froze and that do not act at these velocities, each element's under one name."""
     free = Vector(template, frozen=frozen).names
@@ -74,26 +60,29 @@ def fit_sliding(
     points: SlidingPoints, template: Model, noise: Noise | None, frozen: Iterable[str], starts: int, profiles: bool,
     limits: Mapping[str, tuple[float, float]] | None = None,
 ) -> Fit:  # fmt: skip
-    """Weighted least squares of the law's torque at constant velocity, from many starts, perhaps within limits."""
+    """Fit the torque of a law and a constant torque at constant velocity by weighted least squares, from many starts.
+
+    ``limits`` are further bounds of the search, by name.
+    """
     vector = steady_vector(points, template, frozen)
     # A table of points is fitted as it stands; of a record's levels the slow ones may be in doubt.
     bends = bend_limits(vector, np.abs(points.velocity)) if points.absolute else {}
-    vector = Vector(
-        template, free=vector.names, limits={**levels_of(points, vector), **bends, **(limits or {})}
+    vector = vector_of(
+        points, template, free=vector.names, limits={**levels_of(points, vector), **bends, **(limits or {})}
     )
     if not vector.free:
         raise InputError(f"{template.law.name}: no free parameter acts at constant velocity")
-    steady, weight = Steady(template.law, points.velocity, points.side), points.weight
+    torques, weight = Torques(vector, points.velocity, points.side), points.weight
     target = points.torque * weight
 
     def model(values: Array) -> Array:
-        return weight * steady.torque(vector.packed_values(values))
+        return weight * torques.at_values(values)
 
     def residuals(u: Array) -> Array:
-        return weight * steady.torque(vector.packed(u)) - target
+        return weight * torques.at(u) - target
 
     def at_all(several: Array) -> Array:
-        return weight * steady.torques(np.array([vector.packed(u) for u in several])) - target
+        return weight * torques.at_all(several) - target
 
     first = separable_starts(model, target, vector, starts)
     fc = float(np.median(np.abs(points.torque)))
@@ -112,9 +101,12 @@ def fit_sliding(
 
 
 def levels_of(points: SlidingPoints, vector: Vector) -> dict[str, tuple[float, float]]:
-    """Bounds of the levels of friction: the largest torque recorded."""
-    largest = min(points.largest, BEYOND * float(np.max(np.abs(points.torque))))
-    return torque_limits(vector, largest)
+    """Return the bounds of the levels of friction, N·m.
+
+    They are at most the largest torque recorded, or twice that torque where a constant torque may cancel part of it.
+    """
+    recorded = points.largest if points.offset is not None else 2.0 * points.largest
+    return torque_limits(vector, min(recorded, BEYOND * float(np.max(np.abs(points.torque)))))
 
 
 def identify_sliding(
@@ -126,7 +118,7 @@ def identify_sliding(
     starts: int = 40,
     fastest: float = math.inf,
 ) -> Identification:
-    """Fit a law's curve to torques at constant velocity (thesis 3.1.3.1).
+    """Fit a law's curve to torques at constant velocity (thesis 3.1.3.1), and a constant torque if it is not known.
 
     Parameters
     ----------
@@ -151,7 +143,7 @@ def identify_sliding(
         ``details["next_velocity"]``: where one more point would tell them apart best, rad/s (None: all is told);
         ``details["speeds"]``: the slowest and the fastest speed, rad/s;
         ``details["untouched"]``: parameters that do not act at these velocities, whose values in `model` are those of
-        the template.
+        the template; ``details["constant_torque"]``: the constant torque, N·m, if there is one.
 
     Raises
     ------
@@ -168,11 +160,16 @@ def identify_sliding(
     if len(points) == count and level is not None and level.source == OWN:
         level = None  # a curve through every point is held against nothing
     found = fit_sliding(points, template, level, frozen, starts, profiles=True)
+    if "offset" in found.vector.names:
+        found = apart_from_friction(found, points)
+    elif points.offset is None:
+        found = with_unknown_offset(found, tied_to_offset(points, template, frozen), points)
     unknown = [e.name for e in found.estimates if not e.identified]
     settling = next_velocity(points, found, fastest) if unknown and found.noise.known else None
     model, notes = model_of(found)
     untouched = untouched_parameters(template, frozen, found.vector)
-    notes += _noise_notes(found) + _open_notes(unknown if found.noise.known else [], untouched)
+    constant, said = details_of(found, points)
+    notes += said + _noise_notes(found) + _open_notes(unknown if found.noise.known else [], untouched)
     return Identification(
         "sliding", model, found.estimates, found.correlation, _misfit(points, found), tuple(notes),
         _measure_next(points, found, settling),
@@ -181,7 +178,7 @@ def identify_sliding(
             "free": found.vector.names,
             "family": np.array([found.vector.values(u) for u in found.family]),
             "untouched": untouched, "next_velocity": settling, "speeds": span_of(points),
-            "noise_Nm": found.noise.std, "noise_source": found.noise.source,
+            "noise_Nm": found.noise.std, "noise_source": found.noise.source, **constant,
         },
     )  # fmt: skip
 
@@ -205,8 +202,9 @@ def next_velocity(points: SlidingPoints, found: Fit, fastest: float = math.inf) 
         np.geomspace(BELOW * float(np.min(fast)), ABOVE * min(float(np.max(fast)), fastest / ABOVE), 200),
         dtype=np.float64,
     )
-    steady = Steady(law_of(found), grid, np.ones(grid.size))
-    curves = np.array([steady.torque(found.vector.packed(u)) for u in found.family])
+    if points.offset is None:  # then the other direction may determine more
+        grid = np.concatenate([grid, -grid])
+    curves = Torques(found.vector, grid, np.sign(grid)).at_all(found.family)
     usable = np.all(np.isfinite(curves), axis=1)
     curves, family = curves[usable], found.family[usable]
     if family.shape[0] < 3:

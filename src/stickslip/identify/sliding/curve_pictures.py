@@ -11,7 +11,7 @@ import numpy as np
 from stickslip.identify.estimate import Picture, Trace
 from stickslip.identify.fit.uncertainty import Fit
 from stickslip.identify.sliding.points import SlidingPoints
-from stickslip.simulation.prescribed.steady import Steady
+from stickslip.identify.sliding.torques import Torques
 
 FAMILY = 40
 """How many of the equally good curves are drawn."""
@@ -31,20 +31,22 @@ def listed(names: Sequence[str]) -> str:
 def curve_picture(points: SlidingPoints, found: Fit, settling: float | None) -> Picture:
     """The points, the best curve, and curves that fit as well (thesis figures 3.7 to 3.9, 4.33).
 
-    Negative velocities are carried to the positive side; break-away torques stand at the left edge.
+    Negative velocities are carried to the positive side, and the constant torque is taken off; break-away torques are
+    at the left edge.
     """
     fast = np.abs(points.velocity[points.velocity != 0.0])
     edge = 0.4 * float(np.min(fast))
     grid = np.geomspace(edge, 1.02 * float(np.max(fast)), 300)
-    sides = {side: Steady(law_of(found), side * grid, np.full(grid.size, side)) for side in (1.0, -1.0)}
+    sides = {side: Torques(found.vector, side * grid, np.full(grid.size, side)) for side in (1.0, -1.0)}
+    constant = found.values["offset"]
     unknown = [e.name for e in found.estimates if not e.identified] if found.noise.known else []
     shown = [s for s in sides if np.any(points.side == s)]
-    best = {s: s * sides[s].torque(found.vector.packed(found.u)) for s in shown}
+    best = {s: s * (sides[s].at(found.u) - constant) for s in shown}
     same = len(shown) == 2 and bool(np.allclose(best[1.0], best[-1.0], rtol=1e-9))
     traces: list[Trace] = []
     stride = max(1, found.family.shape[0] // FAMILY)
     for u in found.family[::stride] if unknown else ():
-        curve = shown[0] * sides[shown[0]].torque(found.vector.packed(u))
+        curve = shown[0] * (sides[shown[0]].at(u) - constant)
         if np.all(np.isfinite(curve)):
             traces.append(Trace("" if traces else "equally good", grid, curve, "faint"))
     for s in shown[:1] if same else shown:
@@ -54,7 +56,8 @@ def curve_picture(points: SlidingPoints, found: Fit, settling: float | None) -> 
         rows = points.side == s
         x = np.maximum(np.abs(points.velocity[rows]), edge)
         label = "measured" if len(shown) == 1 else f"measured, v {'>' if s > 0.0 else '<'} 0"
-        traces.append(Trace(label, x, s * points.torque[rows], "points" if s > 0.0 else "open points"))
+        torque = s * (points.torque[rows] - constant)
+        traces.append(Trace(label, x, torque, "points" if s > 0.0 else "open points"))
     message = "The data determine every parameter of this curve."
     if unknown:
         message = f"Not determined: {listed(unknown)}."

@@ -1,82 +1,75 @@
-"""The constant torque of levels in both directions: half of what the torques at one speed add up to."""
+"""The constant torque (weight, offset) of a sliding curve: what the result states about it."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.fit.student import student_quantile
-from stickslip.identify.fit.uncertainty import too_wide
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.fit.uncertainty import Fit
 from stickslip.identify.sliding.points import SlidingPoints
+from stickslip.identify.sliding.torques import OFFSET
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
-
-FEWEST = 3
-"""Speeds in both directions without which nothing is said."""
+LEVEL = "or give --freeze offset=0 if nothing but friction acts (a level axis)"
+BOTH = f"move in both directions, {LEVEL}"
 
 
-def constant_torque(points: SlidingPoints) -> Estimate | None:
-    """The constant torque that acts against positive motion, N·m; None where both directions do not show one.
+def with_unknown_offset(found: Fit, tied: Sequence[str], points: SlidingPoints) -> Fit:
+    """Return a fit that held the constant torque at 0, with the verdict that it is not known.
 
-    At constant velocities it is half of the sum of the torques in both directions, whatever friction is; friction that
-    differs by direction looks alike. Its interval is Student's over the speeds, no narrower than the points' own.
+    Parameters
+    ----------
+    found : Fit
+    tied : sequence of str
+        Parameters of which only the sum with the constant torque is determined.
+    points : SlidingPoints
     """
-    halves, variances = _halves(points)
-    if halves.size < FEWEST:
-        return None
-    weights = 1.0 / variances if points.absolute else np.ones(halves.size)
-    weights /= np.sum(weights)
-    value = float(weights @ halves)
-    spread = math.sqrt(float(weights @ (halves - value) ** 2) / (halves.size - 1))
-    own = math.sqrt(float(weights**2 @ variances)) if points.absolute else 0.0
-    std = max(spread, own)
-    half = student_quantile(halves.size - 1) * std
-    if abs(value) <= half:
-        return None
-    scale, unit = float(np.median(np.abs(points.torque))), points.unit[1]
-    verdict = too_wide(half, unit, scale)
-    return Estimate("offset", unit, "T_0", value, std, value - half, value + half, not verdict, verdict)
+    unit = points.unit[1]
+    remedy = BOTH if points.one_way else LEVEL.removeprefix("or ")
+    why = f"it cannot be distinguished from {' and '.join(tied)}; {remedy}"
+    unknown = Estimate("offset", unit, OFFSET.symbol, 0.0, math.nan, -math.inf, math.inf, False, why)
+    judged = [replace(e, lower=0.0, upper=math.inf, std=math.nan, identified=False,
+                      verdict=f"{_sum(e, points)}; {remedy}") if e.name in tied else e
+              for e in found.estimates]  # fmt: skip
+    correlation = np.eye(len(judged) + 1)
+    correlation[:-1, :-1] = found.correlation
+    return replace(found, estimates=(*judged, unknown), correlation=correlation)
 
 
-def _halves(points: SlidingPoints) -> tuple[Array, Array]:
-    """Half of the sum of the mean torques in both directions by speed, and its variance; shape (speeds,)."""
-    labels, side = points.speeds(), points.side
-    std = np.zeros(len(points)) if points.std is None else points.std
-    found: list[tuple[float, float]] = []
-    for label in np.unique(labels[points.velocity != 0.0]):
-        both = [
-            np.flatnonzero((labels == label) & (side == way) & (points.velocity != 0.0))
-            for way in (1.0, -1.0)
-        ]
-        if all(rows.size for rows in both):
-            mean = sum(float(np.mean(points.torque[rows])) for rows in both)
-            variance = sum(float(np.sum(std[rows] ** 2)) / rows.size**2 for rows in both)
-            found.append((0.5 * mean, 0.25 * variance))
-    halves, variances = np.array(found).reshape(-1, 2).T
-    return halves, variances
+def apart_from_friction(found: Fit, points: SlidingPoints) -> Fit:
+    """Return a fit with the verdict that one direction does not determine the constant torque.
 
-
-def without(points: SlidingPoints, constant: Estimate | None) -> SlidingPoints:
-    """The points less a constant torque."""
-    return points if constant is None else replace(points, torque=points.torque - constant.value)
-
-
-def beside(found: Identification, constant: Estimate | None) -> Identification:
-    """A curve with the constant torque that was taken off its points."""
-    if constant is None:
+    A law without Coulomb friction takes that friction for a constant torque.
+    """
+    if not points.one_way:
         return found
-    size = len(found.estimates)
-    correlation = np.eye(size + 1)
-    correlation[:size, :size] = found.correlation
+    why = f"one direction does not distinguish it from Coulomb friction; {BOTH}"
+    judged = [replace(e, identified=False, verdict=why) if e.name == "offset" else e for e in found.estimates]
+    return replace(found, estimates=tuple(judged))
+
+
+def _sum(e: Estimate, points: SlidingPoints) -> str:
+    """State which sum of a level and the constant torque is determined."""
+    if not points.one_way:
+        return "it cannot be distinguished from a constant torque (offset)"
+    sign = "+" if points.side[0] > 0.0 else "-"
+    limits = f" [{e.lower:.4g}, {e.upper:.4g}]" if math.isfinite(e.lower) and math.isfinite(e.upper) else ""
+    return f"one direction determines only {e.name} {sign} offset, {e.value:.4g}{limits} {e.unit}"
+
+
+def details_of(found: Fit, points: SlidingPoints) -> tuple[Mapping[str, Any], list[str]]:
+    """Return the constant torque for the model's file, and a note, if there is one that differs from 0."""
+    if points.offset is not None:
+        return ({"constant_torque": points.offset} if points.offset else {}), []
+    offset = next(e for e in found.estimates if e.name == "offset")
+    if points.one_way or offset.lower <= 0.0 <= offset.upper:
+        return {}, []
     note = (
-        f"A constant torque of {constant.value:.3g} {constant.unit} was taken off: half of what both directions add up "
-        "to. Friction that differs by direction looks alike."
+        f"A constant torque of {offset.value:.3g} {offset.unit} acts against positive motion. Friction that differs by "
+        "direction looks alike."
     )
-    return replace(
-        found, estimates=(*found.estimates, constant), correlation=correlation, notes=(note, *found.notes),
-        details={**found.details, "constant_torque": constant.value},
-    )  # fmt: skip
+    return {"constant_torque": offset.value}, [note]

@@ -26,15 +26,17 @@ class SlidingPoints:
     velocity : array, shape (n,)
         rad/s; 0 for a break-away torque, whose sign says in which direction.
     torque : array, shape (n,)
-        N·m, positive against positive velocity.
+        Torque that keeps the axis moving, N·m: friction and, with `offset`, a constant torque.
     std : array, shape (n,), optional
         Standard deviations relative to each other; equal where not given.
     absolute : bool
-        Whether they are known in N·m: then no point is said to be better than that.
+        Whether they are known in N·m; no point then has a smaller standard deviation.
     unit : (str, str)
         Of velocity and torque.
     largest : float
-        The largest torque recorded, which no level of friction exceeds, N·m; infinite where it is not known.
+        The largest torque recorded, N·m; infinite if it is not known.
+    offset : float or None
+        Constant torque in `torque` (a weight), N·m; None if it is not known and has to be fitted.
     """
 
     velocity: Array
@@ -43,6 +45,7 @@ class SlidingPoints:
     unit: tuple[str, str] = ("rad/s", "N·m")
     largest: float = math.inf
     absolute: bool = False
+    offset: float | None = 0.0
 
     def __post_init__(self) -> None:
         v, t = np.asarray(self.velocity, np.float64), np.asarray(self.torque, np.float64)
@@ -72,7 +75,7 @@ class SlidingPoints:
         )
         return SlidingPoints(
             np.concatenate([self.velocity, other.velocity]), np.concatenate([self.torque, other.torque]), std,
-            self.unit, max(self.largest, other.largest), self.absolute and other.absolute,
+            self.unit, max(self.largest, other.largest), self.absolute and other.absolute, self.offset,
         )  # fmt: skip
 
     def only(self, rows: Any) -> SlidingPoints:
@@ -89,6 +92,11 @@ class SlidingPoints:
     def side(self) -> Array:
         """Direction of every point, +1 or -1."""
         return np.where(self.velocity != 0.0, np.sign(self.velocity), np.where(self.torque < 0.0, -1.0, 1.0))
+
+    @property
+    def one_way(self) -> bool:
+        """Whether all points belong to one direction of motion."""
+        return bool(np.all(self.side == self.side[0]))
 
     @property
     def weight(self) -> Array:
