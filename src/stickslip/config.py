@@ -52,12 +52,14 @@ class Document:
 
 
 def refuse_endless(path: Path) -> None:
-    """Refuse a pipe or device: reading it may wait for ever, or never come to an end.
+    """Refuse a pipe or device: reading it may wait for ever, or never come to an end; and a name that no file has.
 
     Raises
     ------
     InputError
     """
+    if "\0" in str(path):
+        raise InputError(f"{str(path)!r} contains a NUL character; correct the path")
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise InputError(f"{path} is a pipe or device, not a file; save its content to a file and give that")
 

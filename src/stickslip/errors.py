@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -202,9 +203,44 @@ def suggestion(name: str, known: Iterable[str], otherwise: str = "") -> str:
     return otherwise or (f"choose from {', '.join(names)}" if names else "none is registered")
 
 
-def unwritable(path: Path, error: OSError) -> InputError:
-    """The error that says that a path cannot be written, and why."""
+def unwritable(path: Path, error: OSError, option: str = "--out") -> InputError:
+    """Return the error that states that a path cannot be written, and why; `option` chooses another place."""
     why = error.strerror or str(error)
     if isinstance(error, FileExistsError | NotADirectoryError):
         why = "a file is where a folder is needed"
-    return InputError(f"cannot write {path} ({why}); choose another place with --out")
+    return InputError(f"cannot write {shown_path(path)} ({why}); choose another place with {option}")
+
+
+def shown_path(path: object) -> str:
+    """Return a path as messages show it: in one line, its middle left out if it is very long."""
+    text = str(path) if str(path).isprintable() else repr(str(path))
+    return (
+        text if len(text) <= LONGEST_PATH else f"{text[: LONGEST_PATH // 2]}...{text[-LONGEST_PATH // 4 :]}"
+    )
+
+
+LONGEST_PATH = 200
+"""Characters of a path in a message"""
+BEYOND = (OSError, OverflowError, RecursionError, MemoryError, UnicodeError)
+"""Errors that Python itself raises of a path, a number, a nesting, a size or a text that nothing can work with"""
+
+
+def beyond(error: BaseException) -> InputError:
+    """Return the error of one of `BEYOND` in words: what was given is out of the range of files, numbers or memory."""
+    said = " ".join(str(error).split())[:200]
+    if isinstance(error, OSError):
+        why = error.strerror or said
+        if error.filename is None:
+            return InputError(f"the system refused a file or device ({why})")
+        return InputError(f"cannot use {shown_path(os.fsdecode(error.filename))} ({why}); give another path")
+    if isinstance(error, OverflowError):
+        return InputError(
+            f"a number is out of range ({said}); give numbers of a size that occurs on a machine"
+        )
+    if isinstance(error, RecursionError):
+        return InputError("what was given contains itself, or is nested too deeply; give it flat")
+    if isinstance(error, MemoryError):
+        return InputError(
+            f"this needs more memory than there is ({said or 'out of memory'}); reduce the numbers or the data"
+        )
+    return InputError(f"a text or a name is not Unicode ({said}); correct it")

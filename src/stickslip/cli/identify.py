@@ -265,7 +265,7 @@ def as_data(result: IdentificationResult, made: Mapping[str, Path], answers: Ans
 
 def places(out: Path) -> tuple[Path, Path]:
     """The files of model and report; the folder is made."""
-    from stickslip.study.files import prepared_folder
+    from stickslip.whole_files import prepared_folder
 
     if out.suffix == ".toml":
         prepared_folder(out.parent)

@@ -141,10 +141,10 @@ def rig_of(args: argparse.Namespace) -> Rig:
 def performed(args: argparse.Namespace) -> int:
     """`stickslip rig run`."""
     from stickslip.cli import _output
-    from stickslip.errors import InputError, unwritable
+    from stickslip.errors import InputError
     from stickslip.rigs.procedures import procedure
     from stickslip.rigs.procedures.base import perform, planned
-    from stickslip.study.files import prepared_folder
+    from stickslip.whole_files import prepared_folder
 
     kind = procedure(args.procedure)
     chosen = kind.with_options(pairs(args.set))
@@ -164,10 +164,7 @@ def performed(args: argparse.Namespace) -> int:
         chosen, rig, path=args.stream, progress=_output.say, without_watchdog=args.no_watchdog,
         realtime=args.realtime or None,
     )  # fmt: skip
-    try:
-        result.record.save(out)
-    except OSError as error:
-        raise unwritable(out, error) from None
+    result.record.save(out)
     _files.written([out])
     return shown(result, out, args)
 
@@ -213,7 +210,7 @@ def commissioned(args: argparse.Namespace) -> int:
     from stickslip.commission.headline import headline
     from stickslip.commission.resume import claimed
     from stickslip.errors import InputError
-    from stickslip.study.files import prepared_folder
+    from stickslip.whole_files import prepared_folder
 
     rig = rig_of(args)
     if args.dry_run:

@@ -11,6 +11,9 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from stickslip.errors import InputError
+from stickslip.whole_files import write_whole
+
 LEDGER = ".stickslip-written"
 
 
@@ -29,8 +32,6 @@ def refuse_foreign(paths: Iterable[Path], force: bool = False) -> None:
     InputError
         That names the file and the option.
     """
-    from stickslip.errors import InputError
-
     for path in paths:
         if not path.exists() or path.is_dir():
             continue
@@ -55,8 +56,8 @@ def written(paths: Iterable[Path]) -> None:
         folders.setdefault(path.parent, _ledger(path.parent))[path.name] = _hash(path)
     for folder, known in folders.items():
         lines = [f"{digest}  {name}\n" for name, digest in known.items() if (folder / name).exists()]
-        with suppress(OSError):  # Then the next call asks for --force.
-            (folder / LEDGER).write_text("".join(lines), encoding="utf-8")
+        with suppress(InputError):  # Then the next call requires --force.
+            write_whole(folder / LEDGER, "".join(lines))
 
 
 def _ledger(folder: Path) -> dict[str, str]:
