@@ -21,7 +21,8 @@ The tree of exceptions::
         ├── EventStorm                more switches than the limit in a short time
         └── StepFailure               no step that meets the tolerance was found
 
-and one warning: ``ModelRemark``, a model that runs as it is, but is seldom what was meant.
+and two warnings: ``ModelRemark``, a model that runs as it is, but is seldom what was meant, and ``UnsafePlace``, a
+folder that other users can change.
 """
 
 from __future__ import annotations
@@ -56,6 +57,7 @@ __all__ = [
     "StepFailure",
     "StickslipError",
     "UnknownName",
+    "UnsafePlace",
     "suggestion",
 ]
 
@@ -92,6 +94,10 @@ class UnknownName(InputError):
 
 class ModelRemark(UserWarning):
     """A model that runs as it is, but is seldom what was meant."""
+
+
+class UnsafePlace(UserWarning):
+    """A folder or file that other users can change, and that is therefore not used."""
 
 
 class ConfigError(InputError):

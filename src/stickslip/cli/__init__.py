@@ -20,7 +20,16 @@ from typing import Any, NoReturn
 
 from stickslip import compiling, waiting
 from stickslip.approval import allow_code
-from stickslip.errors import BEYOND, InputError, Interrupted, ModelRemark, StickslipError, beyond, suggestion
+from stickslip.errors import (
+    BEYOND,
+    InputError,
+    Interrupted,
+    ModelRemark,
+    StickslipError,
+    UnsafePlace,
+    beyond,
+    suggestion,
+)
 from stickslip.in_python import with_options
 from stickslip.rules import LARGEST_WHOLE
 from stickslip.verbs.kinds import require
@@ -63,6 +72,8 @@ WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 they are read."""
 
 
+REMARKS = (ModelRemark, UnsafePlace)
+"""Warnings that the command line prints in one line."""
 OPTION = re.compile(r"--([a-z][a-z-]*)")
 
 
@@ -252,14 +263,15 @@ def _check_kinds(args: argparse.Namespace) -> None:
 
 @contextmanager
 def _remarks() -> Generator[None]:
-    """Print remarks on models on stderr, each once and in one line."""
+    """Print remarks on models and places on stderr, each once and in one line."""
     said: set[str] = set()
     with warnings.catch_warnings():
-        warnings.simplefilter("always", ModelRemark)
+        for kind in REMARKS:
+            warnings.simplefilter("always", kind)
         otherwise = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *rest: Any) -> None:
-            if not issubclass(category, ModelRemark):
+            if not issubclass(category, REMARKS):
                 otherwise(message, category, *rest)
             elif str(message) not in said:
                 said.add(str(message))
