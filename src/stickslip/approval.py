@@ -22,7 +22,7 @@ from contextvars import ContextVar
 from pathlib import Path
 
 from stickslip.arguments import arguments_checked
-from stickslip.errors import CodeRefused, InputError, UnsafePlace, unwritable
+from stickslip.errors import CodeRefused, InputError, UnusedPlace, unwritable
 from stickslip.ownership import exposure_of
 
 _allowed: ContextVar[bool] = ContextVar("stickslip_code_allowed", default=False)
@@ -128,7 +128,7 @@ def _approved() -> set[str]:
         if exposure := exposure_of(file):
             warnings.warn(
                 f"approvals in {file} count for nothing, as {exposure}; correct the owner and the mode (chmod go-w)",
-                UnsafePlace,
+                UnusedPlace,
                 stacklevel=2,
             )
             return set()

@@ -21,8 +21,8 @@ The tree of exceptions::
         ├── EventStorm                more switches than the limit in a short time
         └── StepFailure               no step that meets the tolerance was found
 
-and two warnings: ``ModelRemark``, a model that runs as it is, but is seldom what was meant, and ``UnsafePlace``, a
-folder that other users can change.
+and two warnings: ``ModelRemark``, a model that runs as it is, but is seldom what was meant, and ``UnusedPlace``, a
+folder for compiled code or approvals that other users can change.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ __all__ = [
     "StepFailure",
     "StickslipError",
     "UnknownName",
-    "UnsafePlace",
+    "UnusedPlace",
     "suggestion",
 ]
 
@@ -96,8 +96,8 @@ class ModelRemark(UserWarning):
     """A model that runs as it is, but is seldom what was meant."""
 
 
-class UnsafePlace(UserWarning):
-    """A folder or file that other users can change, and that is therefore not used."""
+class UnusedPlace(UserWarning):
+    """A folder for compiled code or approvals that is not used: others can change it, or nothing more fits into it."""
 
 
 class ConfigError(InputError):

@@ -26,7 +26,7 @@ from stickslip.errors import (
     Interrupted,
     ModelRemark,
     StickslipError,
-    UnsafePlace,
+    UnusedPlace,
     beyond,
     suggestion,
 )
@@ -72,7 +72,7 @@ WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 they are read."""
 
 
-REMARKS = (ModelRemark, UnsafePlace)
+REMARKS = (ModelRemark, UnusedPlace)
 """Warnings that the command line prints in one line."""
 OPTION = re.compile(r"--([a-z][a-z-]*)")
 

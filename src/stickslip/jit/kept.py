@@ -27,7 +27,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.runtime.nrt import rtsys
 
 from stickslip import compiling
-from stickslip.errors import UnsafePlace
+from stickslip.errors import UnusedPlace
 from stickslip.ownership import exposure_of
 
 ROOMS = ("jit", "simulation", "machines", "rigs")
@@ -56,7 +56,7 @@ def cache_folder(rooms: tuple[str, ...] = ROOMS) -> Path:
             warnings.warn(
                 f"compiled code is not read from {home}, as {exposure}; correct the owner and the mode (chmod go-w), "
                 "or set STICKSLIP_CACHE to a folder of your own",
-                UnsafePlace,
+                UnusedPlace,
                 stacklevel=2,
             )
         elif os.access(folder, os.W_OK):
@@ -144,6 +144,18 @@ class _Kept(FunctionCache):
                 return found
         return super().load_overload(sig, target_context)
 
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            _warn_not_kept(cache_folder(), error)
+
+
+def _warn_not_kept(folder: Path, error: OSError) -> None:
+    """Warn that code has to be compiled again by the next process."""
+    why = error.strerror or str(error)
+    warnings.warn(f"compiled code is not kept in {folder.parent} ({why})", UnusedPlace, stacklevel=3)
+
 
 decorating = threading.RLock()
 GENERATED = "stickslip._compiled."
@@ -159,6 +171,17 @@ def cached(compiled: Any, function: Any) -> Any:
     return compiled
 
 
+def _write_module(path: Path, text: str) -> None:
+    """Write a module by a draft of its own, so that no other process or thread reads half a file."""
+    draft = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.tmp")
+    try:
+        draft.write_text(text)
+        os.replace(draft, path)
+    except OSError:
+        draft.unlink(missing_ok=True)
+        raise
+
+
 def loaded(name: str, text: str) -> Any:
     """Import a generated module, written to a file so that its compiled code can be cached.
 
@@ -166,12 +189,15 @@ def loaded(name: str, text: str) -> Any:
     any change of the engines: it has a folder that such a change leaves as it is.
     """
     alone = set(_CALLED.findall(text)) <= {"stickslip.jit"}
-    path = cache_folder(ROOMS[:1] if alone else ROOMS) / f"{name}.py"
+    folder = cache_folder(ROOMS[:1] if alone else ROOMS)
+    path = folder / f"{name}.py"
     if not path.exists():
-        # Written aside and renamed, so that no other process or thread reads half a file.
-        draft = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.tmp")
-        draft.write_text(text)
-        os.replace(draft, path)
+        try:
+            _write_module(path, text)
+        except OSError as error:
+            _warn_not_kept(folder, error)
+            path = _temporary_folder() / path.name
+            _write_module(path, text)
     spec = importlib.util.spec_from_file_location(f"{GENERATED}{name}", path)
     assert spec is not None
     assert spec.loader is not None

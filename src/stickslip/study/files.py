@@ -29,10 +29,10 @@ KINDS = ("study", "sweep", "tune")
 MARK = ".stickslip-results"
 """File that says whose results a folder holds, from before the first of them"""
 PLACES = (
-    "manifest.json", "metrics.csv", "metrics.parquet", "summary.csv", "report.html", "inputs", "figures", "records",
-    "data", "variants",
+    "manifest.json", "metrics.csv", "metrics.parquet", "summary.csv", "report.html", "results.jsonl", "*-tuned.json",
+    "*-tried.csv", "inputs", "figures", "records", "data", "variants",
 )  # fmt: skip
-"""Where results go: what lies there and is not ours is not written over"""
+"""Patterns of the names of results: what is there and is not ours is not overwritten"""
 
 
 def claim_folder(folder: Path, name: str, kind: str = "study") -> Path:
@@ -53,11 +53,11 @@ def claim_folder(folder: Path, name: str, kind: str = "study") -> Path:
     """
     found = _owner(folder)
     if found is None:
-        for place in PLACES:
-            if (folder / place).is_file() or any(_inside(folder / place)):
+        for place in (found for pattern in PLACES for found in folder.glob(pattern)):
+            if place.is_file() or any(_inside(place)):
                 raise InputError(
-                    f"{folder} holds {place} already, which no {kind} of stickslip wrote; choose another place with "
-                    "--out, or move it away"
+                    f"{folder} holds {place.name} already, which no {kind} of stickslip wrote; choose another place "
+                    "with --out, or move it away"
                 )
     elif found != (kind, name):
         raise InputError(

@@ -33,8 +33,10 @@ def refuse_foreign(paths: Iterable[Path], force: bool = False) -> None:
         That names the file and the option.
     """
     for path in paths:
-        if not path.exists() or path.is_dir():
+        if not path.exists():
             continue
+        if path.is_dir():
+            raise InputError(f"{path} is a folder; give the name of a file")
         if not path.is_file():
             raise InputError(f"{path} is not a regular file; give another name")
         if not force and not ours(path):

@@ -43,12 +43,8 @@ KNOWN: Mapping[str, type] = {
     "sent": list, "logs": list,
 }  # fmt: skip
 """What each value of an item's JSON is; one of another kind is left out."""
-EMPTY: Mapping[str, Mapping[str, Any]] = {
-    "rigs": {"facts": [], "sent": []},
-    "models": {"sent": []},
-    "studies": {"sent": []},
-}
-"""What the page expects of each kind"""
+EMPTY: Mapping[str, Mapping[str, Any]] = {"rigs": {"facts": [], "sent": []}, "studies": {"sent": []}}
+"""What the page expects of each kind; a model without `sent` was identified here."""
 
 
 class NotThere(InputError):
