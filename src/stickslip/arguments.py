@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import chain, repeat
 from typing import Any, ParamSpec, TypeVar, cast
 
-from stickslip.errors import BEYOND, InputError, ParameterError, StickslipError, UnknownName, beyond
+from stickslip.errors import BEYOND, InputError, ParameterError, StickslipError, UnknownName, beyond, one_line
 from stickslip.in_python import SIGNALS, in_python
 from stickslip.rules import Rule, Wrong, rule_of
 
@@ -69,7 +69,9 @@ def shown_value(value: object) -> str:
     """Return a value as messages show it: in one line of at most 60 characters, whatever it contains."""
     try:
         shown = " ".join(repr(value).split())
-    except (RecursionError, ValueError):  # nested too deeply; a number with more digits than Python prints
+    except (
+        Exception
+    ):  # nested too deeply, a number with more digits than Python prints, or a class whose repr fails
         shown = " ".join(reprlib.repr(value).split())
     return shown if len(shown) <= 60 else f"{shown[:57]}..."
 
@@ -218,7 +220,7 @@ def arguments_checked(function: Callable[P, R], module: str = "") -> Callable[P,
             refuse_call(owner, takes.listed, signature, args, kwargs)
             raise
         except StickslipError as error:
-            words = in_python(str(error), owner, not takes.signals.isdisjoint(kwargs))
+            words = one_line(in_python(str(error), owner, not takes.signals.isdisjoint(kwargs)))
             error.args = (words, *error.args[1:])
             raise
         except BEYOND as error:

@@ -30,6 +30,7 @@ from __future__ import annotations
 import difflib
 import math
 import os
+import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -217,16 +218,18 @@ def unwritable(path: Path, error: OSError, option: str = "--out") -> InputError:
     return InputError(f"cannot write {shown_path(path)} ({why}); choose another place with {option}")
 
 
+def one_line(message: str) -> str:
+    """Return a message in one line, the middle of very long names left out."""
+    return OVERLONG.sub(r"\1...\2", " ".join(message.split()))
+
+
 def shown_path(path: object) -> str:
-    """Return a path as messages show it: in one line, its middle left out if it is very long."""
-    text = str(path) if str(path).isprintable() else repr(str(path))
-    return (
-        text if len(text) <= LONGEST_PATH else f"{text[: LONGEST_PATH // 2]}...{text[-LONGEST_PATH // 4 :]}"
-    )
+    """Return a path as messages show it, escaped if it does not print."""
+    return one_line(str(path) if str(path).isprintable() else repr(str(path)))
 
 
-LONGEST_PATH = 200
-"""Characters of a path in a message"""
+OVERLONG = re.compile(r"(\S{100})\S{100,}(\S{50})")
+"""A path, name or value that would bury the rest of a message"""
 BEYOND = (OSError, OverflowError, RecursionError, MemoryError, UnicodeError)
 """Errors that Python itself raises of a path, a number, a nesting, a size or a text that nothing can work with"""
 

@@ -87,7 +87,15 @@ def is_number(value: object) -> bool:
         return not isinstance(value, bool) and abs(value) <= LARGEST
     if isinstance(value, float):
         return True
-    return hasattr(value, "__float__") and getattr(value, "ndim", 0) == 0
+    if isinstance(value, (str, bytes)) or getattr(value, "ndim", 0) != 0:
+        return False
+    if getattr(getattr(value, "dtype", None), "kind", "f") not in "fiubO":
+        return False  # a date or a text of NumPy
+    try:
+        float(cast("Any", value))
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return True
 
 
 def is_whole(value: Any) -> bool:
@@ -222,7 +230,9 @@ def _several(item: Rule | None, iterable: bool) -> Rule:
         ):
             return Wrong("", given, words)
         if hasattr(given, "dtype"):
-            numbers = item is None or item.make is None or getattr(given.dtype, "kind", "f") in "fiubO"
+            if item is not None and item.make is None:
+                return _each(item, list(given))
+            numbers = item is None or getattr(given.dtype, "kind", "f") in "fiubO"
             return None if numbers else Wrong("", given, words)
         return _each(item, given) if isinstance(given, (list, tuple, abc.Set)) else None
 
@@ -236,7 +246,9 @@ def _fixed(items: list[Rule | None]) -> Rule:
     words = f"{size} {MANY[first.words]}" if first and alike else f"a tuple of {size}"
 
     def wrong(value: Any) -> Wrong | None:
-        if not isinstance(value, (tuple, list)) and not hasattr(value, "dtype"):
+        if not isinstance(value, (tuple, list)) and not (
+            hasattr(value, "dtype") and getattr(value, "ndim", 0)
+        ):
             return Wrong("", value, words)
         given = cast("tuple[Any, ...]", value)
         for i, (item, inside) in enumerate(zip(items, given)):

@@ -28,6 +28,7 @@ from stickslip.errors import (
     StickslipError,
     UnusedPlace,
     beyond,
+    one_line,
     suggestion,
 )
 from stickslip.in_python import with_options
@@ -176,6 +177,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _tell(line: str) -> None:
     """A line on stderr, above a bar if there is one."""
+    line = one_line(line)
     if "tqdm" in sys.modules:
         sys.modules["tqdm"].tqdm.write(f"stickslip: {line}", file=sys.stderr)
     else:
@@ -290,7 +292,7 @@ def as_given(message: str, argv: Sequence[str]) -> str:
 
 def _complain(what: object, code: int) -> int:
     """Print one line on stderr, whatever the message holds."""
-    print("stickslip: " + " ".join(str(what).split()), file=sys.stderr)
+    print(f"stickslip: {one_line(str(what))}", file=sys.stderr)
     return code
 
 
