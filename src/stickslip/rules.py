@@ -112,7 +112,7 @@ def is_truth(value: Any) -> bool:
 
 def has_no_nul(path: str | bytes) -> bool:
     """Whether a path is without the NUL character, which no file system takes."""
-    return ("\0" if isinstance(path, str) else b"\0") not in path
+    return "\0" not in path if isinstance(path, str) else b"\0" not in path
 
 
 FITS: Mapping[type, Callable[[Any], bool]] = {float: is_number, int: is_whole, bool: is_truth}
@@ -138,7 +138,12 @@ def rule_of(hint: Any) -> Rule | None:
         return _plain("a function", callable, {types.FunctionType, types.MethodType})
     kind: Any = origin or hint
     if kind is os.PathLike:
-        return _plain(PATH, lambda value: isinstance(value, os.PathLike) and has_no_nul(os.fspath(value)))
+        return _plain(
+            PATH,
+            lambda value: (
+                isinstance(value, os.PathLike) and has_no_nul(os.fspath(cast("os.PathLike[str]", value)))
+            ),
+        )
     if kind in (abc.Mapping, dict):
         return _mapping(*[rule_of(part) for part in inner] or (None, None))
     if kind is tuple and Ellipsis not in inner:

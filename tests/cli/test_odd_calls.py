@@ -32,7 +32,7 @@ sample_time = 1e-3
 """
 CALLS = [
     *(([verb, f"{LONG}{suffix}"], LONG[:30]) for verb in ("identify", "doctor", "simulate", "learn", "study", "sweep",
-       "tune", "machine", "export", "rerun", "cite", "law") for suffix in (".toml", ".csv", "")),
+       "tune", "machine", "rerun", "cite", "law") for suffix in (".toml", ".csv", "")),
     (["identify", DEMO, "--law", f"{LONG}.py"], LONG[:30]),
     (["identify", DEMO, "--law", "coulomb", "--out", LONG], "File name too long"),
     (["simulate", RUN, "--out", f"{LONG}.npz"], "File name too long"),

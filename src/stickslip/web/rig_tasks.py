@@ -121,7 +121,9 @@ def rig_plan(request: Request, say: Said) -> dict[str, Any]:
 def facts_of(request: Request) -> dict[str, Any]:
     """Return the facts in the file of a rig, and the sentence to confirm; both empty for a machine of the library."""
     file = str(request["rig"])
-    said = described(Path(file)) if file else {"facts": [], "sentence": ""}
+    if not file:
+        return {"facts": [], "sentence": ""}
+    said = described(Path(file))
     return {key: said[key] for key in ("facts", "sentence")}
 
 

@@ -77,9 +77,9 @@ class Site:
             problem = problem or STOPPED + REMEDY[kind]
         if not problem:
             return about
-        failed = (
-            {"state": "unread", "readable": False, "columns": []} if kind == "logs" else {"state": "failed"}
-        )
+        failed: dict[str, Any] = {"state": "failed"}
+        if kind == "logs":
+            failed = {"state": "unread", "readable": False, "columns": []}
         return {**about, **failed, "problem": problem}
 
     def summary(self, project: Project) -> dict[str, Any]:
