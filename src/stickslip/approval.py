@@ -2,10 +2,12 @@
 
 A law or rig that the user names (``Model("my_law.py")``, ``--law my_law.py``, STICKSLIP_LAWS) is asked for. One that a
 TOML file names (``law = "x.py"``, ``plugins``, ``kind = "x.py"``) may come from somebody else: it runs inside
-`allow_code`, with ``--allow-code`` on the command line, or if this user ran the same bytes before. The command line
-remembers their SHA-256 in the file ``approved`` of the folder STICKSLIP_CONFIG, else the user's folder of settings.
-What the code itself imports is not looked at. A pickle runs the text of a law's file that it holds without being asked,
-as every pickle may run code: unpickle only what comes from somebody whose code you would run.
+`allow_code`, with ``--allow-code`` on the command line, after its text was confirmed in the page, or if this user
+approved the same bytes before. Approvals are kept per user, as SHA-256 of the bytes, in the file ``approved`` of the
+folder STICKSLIP_CONFIG, else the user's folder of settings: one store for the command line and the page, outside of
+every folder that somebody may send. What the code itself imports is not looked at. A pickle runs the text of a law's
+file that it holds without being asked, as every pickle may run code: unpickle only what comes from somebody whose code
+you would run.
 """
 
 from __future__ import annotations
@@ -13,15 +15,17 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Collection, Generator
+import warnings
+from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
 from stickslip.arguments import arguments_checked
-from stickslip.errors import CodeRefused
+from stickslip.errors import CodeRefused, InputError, UnusedPlace, unwritable
+from stickslip.ownership import exposure_of
 
-_allowed: ContextVar[bool | frozenset[str]] = ContextVar("stickslip_code_allowed", default=False)
+_allowed: ContextVar[bool] = ContextVar("stickslip_code_allowed", default=False)
 _remember: ContextVar[bool] = ContextVar("stickslip_code_remember", default=False)
 _ran: set[str] = set()
 """SHA-256 of what ran in this process."""
@@ -29,19 +33,17 @@ _ran: set[str] = set()
 
 @arguments_checked
 @contextmanager
-def allow_code(allowed: bool | Collection[str] = True, *, remember: bool = False) -> Generator[None]:
+def allow_code(allowed: bool = True, *, remember: bool = False) -> Generator[None]:
     """Let code that TOML files name run: the laws and rigs of a model, study or rig that somebody sent.
 
     Parameters
     ----------
-    allowed : bool or collection of str
-        False refuses what nobody approved; so it is outside, too. A collection holds the SHA-256 of the codes that may
-        run, and no other runs, whatever was approved before.
+    allowed : bool
+        False refuses what nobody approved; so it is outside, too.
     remember : bool
         Whether what runs is known from now on, in other processes too.
     """
-    chosen = allowed if isinstance(allowed, bool) else frozenset(allowed)
-    before = _allowed.set(chosen), _remember.set(remember)
+    before = _allowed.set(allowed), _remember.set(remember)
     try:
         yield
     finally:
@@ -50,10 +52,39 @@ def allow_code(allowed: bool | Collection[str] = True, *, remember: bool = False
 
 
 def approved_file() -> Path:
-    """Where the command line keeps the SHA-256 of code that this user has let run: a line each, with its path."""
+    """Return the file that keeps the SHA-256 of code that this user has let run: a line each, with its path."""
     own = os.environ.get("STICKSLIP_CONFIG")
     settings = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
     return (Path(own) if own else Path(settings) / "stickslip") / "approved"
+
+
+def approve(path: str, digest: str) -> None:
+    """Keep the SHA-256 of code that this user lets run, for every later process.
+
+    Parameters
+    ----------
+    path : str
+        Of the code, for people who read the list.
+    digest : str
+
+    Raises
+    ------
+    InputError
+        If it cannot be kept.
+    """
+    file = approved_file()
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if exposure := exposure_of(file if file.exists() else file.parent):
+            raise InputError(
+                f"an approval is not kept in {file}, as {exposure}; correct the owner and the mode"
+            )
+        with os.fdopen(os.open(file, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600), "ab") as out:
+            # One write, so that approvals of two processes do not mix; after a line that was cut short, a new one.
+            line = f"{digest}  {' '.join(path.split())}\n".encode("utf-8", "backslashreplace")
+            out.write(line if _ends_with_newline(file) else b"\n" + line)
+    except OSError as error:
+        raise unwritable(file, error, "STICKSLIP_CONFIG") from None
 
 
 def asked_for(path: str, code: bytes) -> None:
@@ -78,14 +109,12 @@ def demand(path: str, code: bytes, named_by: str) -> None:
     CodeRefused
     """
     digest = hashlib.sha256(code).hexdigest()
-    allowed = _allowed.get()
-    known = digest in allowed if isinstance(allowed, frozenset) else digest in _ran or digest in _approved()
-    if known:
+    if digest in _ran or digest in _approved():
         return
-    if allowed is not True:
+    if not _allowed.get():
         raise CodeRefused(
-            f"{named_by} would run the Python code of {path}, which nobody has approved here; read it, then give "
-            "--allow-code (in Python: `with stickslip.allow_code():`)",
+            f"{named_by} would run the Python code of {path}, which is not approved on this computer; read it, then "
+            "give --allow-code (in Python: `with stickslip.allow_code():`)",
             path, code,
         )  # fmt: skip
     _note(path, digest)
@@ -94,8 +123,16 @@ def demand(path: str, code: bytes, named_by: str) -> None:
 
 
 def _approved() -> set[str]:
+    file = approved_file()
     try:
-        lines = approved_file().read_text(encoding="utf-8", errors="replace").splitlines()
+        if exposure := exposure_of(file):
+            warnings.warn(
+                f"approvals in {file} count for nothing, as {exposure}; correct the owner and the mode (chmod go-w)",
+                UnusedPlace,
+                stacklevel=2,
+            )
+            return set()
+        lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return set()
     return {line.partition(" ")[0] for line in lines}
@@ -103,10 +140,11 @@ def _approved() -> set[str]:
 
 def _note(path: str, digest: str) -> None:
     _ran.add(digest)
-    if not _remember.get() or digest in _approved():
-        return
-    with suppress(OSError):  # Without a folder of settings it is asked for again.
-        file = approved_file()
-        file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        with file.open("a", encoding="utf-8", errors="backslashreplace") as out:
-            out.write(f"{digest}  {' '.join(path.split())}\n")
+    if _remember.get() and digest not in _approved():
+        with suppress(InputError):  # Without a folder of settings it is asked for again.
+            approve(path, digest)
+
+
+def _ends_with_newline(file: Path) -> bool:
+    content = file.read_bytes()
+    return not content or content.endswith(b"\n")

@@ -9,12 +9,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
+import reprlib
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain, repeat
 from typing import Any, ParamSpec, TypeVar, cast
 
-from stickslip.errors import ParameterError, StickslipError, UnknownName
+from stickslip.errors import BEYOND, InputError, ParameterError, StickslipError, UnknownName, beyond, one_line
 from stickslip.in_python import SIGNALS, in_python
 from stickslip.rules import Rule, Wrong, rule_of
 
@@ -50,17 +51,29 @@ def no_number(owner: str, name: str, value: object, unit: str = "") -> Parameter
 def refusal(owner: str, name: str, wrong: Wrong, lists: bool = False) -> ParameterError:
     """As `no_number`, of anything; `lists`: a list of names would do."""
     place, value, words = wrong
-    shown = " ".join(repr(value).split())
-    shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
+    shown = shown_value(value)
     said = f"{owner}: {name}{place} = {shown} must be {words}"
     if isinstance(value, str) and says_number(value) and words.startswith(("a number", "a whole number")):
         said += f"; write it without quotes, {value.strip()}"
+    elif type(value) is int and words.startswith(("a number", "a whole number")):
+        said += "; it is too large"
     elif isinstance(value, str) and lists and not place:
         # Each of its letters would be taken for a name.
         said += f"; write [{shown}]"
     elif name in EXAMPLES and not place:
         said += f", such as {EXAMPLES[name]}"
     return ParameterError(said)
+
+
+def shown_value(value: object) -> str:
+    """Return a value as messages show it: in one line of at most 60 characters, whatever it contains."""
+    try:
+        shown = " ".join(repr(value).split())
+    except (
+        Exception
+    ):  # nested too deeply, a number with more digits than Python prints, or a class whose repr fails
+        shown = " ".join(reprlib.repr(value).split())
+    return shown if len(shown) <= 60 else f"{shown[:57]}..."
 
 
 def says_number(text: str) -> bool:
@@ -207,9 +220,13 @@ def arguments_checked(function: Callable[P, R], module: str = "") -> Callable[P,
             refuse_call(owner, takes.listed, signature, args, kwargs)
             raise
         except StickslipError as error:
-            words = in_python(str(error), owner, not takes.signals.isdisjoint(kwargs))
+            words = one_line(in_python(str(error), owner, not takes.signals.isdisjoint(kwargs)))
             error.args = (words, *error.args[1:])
             raise
+        except BEYOND as error:
+            if isinstance(error, OSError) and error.filename is None:
+                raise  # of a device or a pipe of the caller's, not of a path that was given
+            raise InputError(in_python(f"{owner}: {beyond(error)}", owner)) from error
 
     return checked
 

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 import re
 import tomllib
 import warnings
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self, cast
@@ -49,17 +51,38 @@ class Document:
         """Where the file written as `written` lies; it is remembered as an input."""
         if not written.isprintable() or not written.strip():
             raise ConfigError(f"{self.name}: {written!r} is not a valid file path; correct it")
-        self.files[written] = self.moved.get(written, self.folder / written)
-        return self.files[written]
+        path = self.moved.get(written, self.folder / written)
+        root = _root.get()
+        if root is not None and not Path(os.path.realpath(path)).is_relative_to(root):
+            raise ConfigError(
+                f"{self.name}: {written!r} is outside of {root.name}; copy that file into it, and name the copy"
+            )
+        self.files[written] = path
+        return path
+
+
+_root: ContextVar[Path | None] = ContextVar("stickslip_config_root", default=None)
+
+
+@contextmanager
+def confined_to(folder: Path) -> Generator[None]:
+    """Let TOML files that somebody may have sent name files of one folder only, links resolved."""
+    before = _root.set(Path(os.path.realpath(folder)))
+    try:
+        yield
+    finally:
+        _root.reset(before)
 
 
 def refuse_endless(path: Path) -> None:
-    """Refuse a pipe or device: reading it may wait for ever, or never come to an end.
+    """Refuse a pipe or device: reading it may wait for ever, or never come to an end; and a name that no file has.
 
     Raises
     ------
     InputError
     """
+    if "\0" in str(path):
+        raise InputError(f"{str(path)!r} contains a NUL character; correct the path")
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise InputError(f"{path} is a pipe or device, not a file; save its content to a file and give that")
 

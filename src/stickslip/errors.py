@@ -22,13 +22,16 @@ The tree of exceptions::
         ├── EventStorm                more switches than the limit in a short time
         └── StepFailure               no step that meets the tolerance was found
 
-and one warning: ``ModelRemark``, a model that runs as it is, but is seldom what was meant.
+and two warnings: ``ModelRemark``, a model that runs as it is, but is seldom what was meant, and ``UnusedPlace``, a
+folder for compiled code or approvals that other users can change.
 """
 
 from __future__ import annotations
 
 import difflib
 import math
+import os
+import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,6 +60,7 @@ __all__ = [
     "StepFailure",
     "StickslipError",
     "UnknownName",
+    "UnusedPlace",
     "suggestion",
 ]
 
@@ -93,6 +97,10 @@ class UnknownName(InputError):
 
 class ModelRemark(UserWarning):
     """A model that runs as it is, but is seldom what was meant."""
+
+
+class UnusedPlace(UserWarning):
+    """A folder for compiled code or approvals that is not used: others can change it, or nothing more fits into it."""
 
 
 class ConfigError(InputError):
@@ -222,9 +230,46 @@ def suggestion(
     return otherwise or (f"choose from {', '.join(names)}" if names else "none is registered")
 
 
-def unwritable(path: Path, error: OSError) -> InputError:
-    """The error that says that a path cannot be written, and why."""
+def unwritable(path: Path, error: OSError, option: str = "--out") -> InputError:
+    """Return the error that states that a path cannot be written, and why; `option` chooses another place."""
     why = error.strerror or str(error)
     if isinstance(error, FileExistsError | NotADirectoryError):
         why = "a file is where a folder is needed"
-    return InputError(f"cannot write {path} ({why}); choose another place with --out")
+    return InputError(f"cannot write {shown_path(path)} ({why}); choose another place with {option}")
+
+
+def one_line(message: str) -> str:
+    """Return a message in one line, the middle of very long names left out."""
+    return OVERLONG.sub(r"\1...\2", " ".join(message.split()))
+
+
+def shown_path(path: object) -> str:
+    """Return a path as messages show it, escaped if it does not print."""
+    return one_line(str(path) if str(path).isprintable() else repr(str(path)))
+
+
+OVERLONG = re.compile(r"(\S{100})\S{100,}(\S{50})")
+"""A path, name or value that would bury the rest of a message"""
+BEYOND = (OSError, OverflowError, RecursionError, MemoryError, UnicodeError)
+"""Errors that Python itself raises of a path, a number, a nesting, a size or a text that nothing can work with"""
+
+
+def beyond(error: BaseException) -> InputError:
+    """Return the error of one of `BEYOND` in words: what was given is out of the range of files, numbers or memory."""
+    said = " ".join(str(error).split())[:200]
+    if isinstance(error, OSError):
+        why = error.strerror or said
+        if error.filename is None:
+            return InputError(f"the system refused a file or device ({why})")
+        return InputError(f"cannot use {shown_path(os.fsdecode(error.filename))} ({why}); give another path")
+    if isinstance(error, OverflowError):
+        return InputError(
+            f"a number is out of range ({said}); give numbers of a size that occurs on a machine"
+        )
+    if isinstance(error, RecursionError):
+        return InputError("what was given contains itself, or is nested too deeply; give it flat")
+    if isinstance(error, MemoryError):
+        return InputError(
+            f"this needs more memory than there is ({said or 'out of memory'}); reduce the numbers or the data"
+        )
+    return InputError(f"a text or a name is not Unicode ({said}); correct it")

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
-from stickslip.errors import InputError, suggestion, unwritable
+from stickslip.errors import InputError, suggestion
 from stickslip.extras import needed
 from stickslip.values import same
+from stickslip.whole_files import draft_of
 
 if TYPE_CHECKING:
     import pandas
@@ -94,14 +95,9 @@ class Record:
         """
         target = Path(path)
         header = json.dumps({"units": dict(self.units), "meta": dict(self.meta)})
-        draft = target.with_name(target.name + ".part")
-        try:
-            with draft.open("wb") as file:
-                arrays: dict[str, Any] = {"time": self.time, **self.channels}
-                np.savez(file, __header__=np.array(header), **arrays)
-            os.replace(draft, target)
-        except OSError as error:
-            raise unwritable(target, error) from None
+        arrays: dict[str, Any] = {"time": self.time, **self.channels}
+        with draft_of(target) as draft, draft.open("wb") as file:
+            np.savez(file, __header__=np.array(header), **arrays)
         return target
 
     @classmethod

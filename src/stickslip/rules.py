@@ -6,6 +6,7 @@ import collections.abc as abc
 import functools
 import os
 import re
+import sys
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -30,12 +31,19 @@ KINDS = {
 MANY = {"a number": "numbers", "a whole number": "whole numbers", "text": "names", "a path": "paths"}
 FEW = 3
 """Kinds that are each told with how to come by one, at most."""
+PATH = "a path"
 PLAIN = {
     float: "a number", int: "a whole number", bool: "True or False", str: "text", types.NoneType: "None",
 }  # fmt: skip
 FUNCTION: Any = get_origin(Callable[..., Any])
 SEQUENCES = (abc.Sequence, list)
 ITERABLES = (abc.Iterable, abc.Collection, abc.Set, set, frozenset)
+
+
+LARGEST = int(sys.float_info.max)
+"""Whole numbers beyond this have no value as a float."""
+LARGEST_WHOLE = 2**63
+"""Whole numbers of this size and more do not fit into the counters of compiled code."""
 
 
 class Wrong(NamedTuple):
@@ -75,14 +83,24 @@ class Rule:
 
 def is_number(value: object) -> bool:
     """Whether it may stand for a number: what has a value as a float, but no text, no truth value and no array."""
-    if isinstance(value, (float, int)):
-        return not isinstance(value, bool)
-    return hasattr(value, "__float__") and getattr(value, "ndim", 0) == 0
+    if isinstance(value, int):
+        return not isinstance(value, bool) and abs(value) <= LARGEST
+    if isinstance(value, float):
+        return True
+    if isinstance(value, (str, bytes)) or getattr(value, "ndim", 0) != 0:
+        return False
+    if getattr(getattr(value, "dtype", None), "kind", "f") not in "fiubO":
+        return False  # a date or a text of NumPy
+    try:
+        float(cast("Any", value))
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return True
 
 
 def is_whole(value: Any) -> bool:
     """Whether it may stand for a whole number: 2.0 may."""
-    return is_number(value) and float(value).is_integer()
+    return is_number(value) and float(value).is_integer() and abs(value) < LARGEST_WHOLE
 
 
 def is_truth(value: Any) -> bool:
@@ -90,6 +108,11 @@ def is_truth(value: Any) -> bool:
     return isinstance(value, bool) or (
         getattr(value, "ndim", 0) == 0 and is_number(value) and value in (0, 1)
     )
+
+
+def has_no_nul(path: str | bytes) -> bool:
+    """Whether a path is without the NUL character, which no file system takes."""
+    return "\0" not in path if isinstance(path, str) else b"\0" not in path
 
 
 FITS: Mapping[type, Callable[[Any], bool]] = {float: is_number, int: is_whole, bool: is_truth}
@@ -106,7 +129,7 @@ def rule_of(hint: Any) -> Rule | None:
     if hint is None or hint in PLAIN:
         kind = types.NoneType if hint is None else hint
         fits = FITS.get(kind, lambda value: isinstance(value, kind))
-        quick = {float, int} if kind is float else {kind}
+        quick = set[type]() if kind is int else {kind}
         return _plain(PLAIN[kind], fits, quick, kind if kind in (int, float) else None)
     if origin is Literal:
         listed = _joined([repr(word) for word in inner])
@@ -115,7 +138,12 @@ def rule_of(hint: Any) -> Rule | None:
         return _plain("a function", callable, {types.FunctionType, types.MethodType})
     kind: Any = origin or hint
     if kind is os.PathLike:
-        return _plain("a path", lambda value: isinstance(value, os.PathLike))
+        return _plain(
+            PATH,
+            lambda value: (
+                isinstance(value, os.PathLike) and has_no_nul(os.fspath(cast("os.PathLike[str]", value)))
+            ),
+        )
     if kind in (abc.Mapping, dict):
         return _mapping(*[rule_of(part) for part in inner] or (None, None))
     if kind is tuple and Ellipsis not in inner:
@@ -149,6 +177,9 @@ def _union(members: list[Rule | None]) -> Rule | None:
     known = [m for m in members if m is not None]
     if len(known) < len(members):
         return None
+    if any(m.words == PATH for m in known):
+        text = _plain("text", lambda value: isinstance(value, str) and has_no_nul(value))
+        known = [text if m.words == "text" else m for m in known]
     words = _any_of(list(dict.fromkeys(m.words for m in known if m.words != "None")))
 
     def wrong(value: Any) -> Wrong | None:
@@ -204,7 +235,9 @@ def _several(item: Rule | None, iterable: bool) -> Rule:
         ):
             return Wrong("", given, words)
         if hasattr(given, "dtype"):
-            numbers = item is None or item.make is None or getattr(given.dtype, "kind", "f") in "fiubO"
+            if item is not None and item.make is None:
+                return _each(item, list(given))
+            numbers = item is None or getattr(given.dtype, "kind", "f") in "fiubO"
             return None if numbers else Wrong("", given, words)
         return _each(item, given) if isinstance(given, (list, tuple, abc.Set)) else None
 
@@ -218,7 +251,9 @@ def _fixed(items: list[Rule | None]) -> Rule:
     words = f"{size} {MANY[first.words]}" if first and alike else f"a tuple of {size}"
 
     def wrong(value: Any) -> Wrong | None:
-        if not isinstance(value, (tuple, list)) and not hasattr(value, "dtype"):
+        if not isinstance(value, (tuple, list)) and not (
+            hasattr(value, "dtype") and getattr(value, "ndim", 0)
+        ):
             return Wrong("", value, words)
         given = cast("tuple[Any, ...]", value)
         for i, (item, inside) in enumerate(zip(items, given)):

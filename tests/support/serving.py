@@ -87,3 +87,14 @@ def ended(client: Any, project: str, job: str, patience: float = 120.0) -> dict[
             return about
         time.sleep(0.1)
     raise AssertionError(f"{job} did not end in {patience} s")
+
+
+def settled(client: Any, address: str, patience: float = 120.0) -> dict[str, Any]:
+    """What is known of an item, when no job works on it."""
+    until = time.monotonic() + patience
+    while time.monotonic() < until:
+        about: dict[str, Any] = client.get(address).json()
+        if about["state"] not in ("coming", "reading", "looking", "running"):
+            return about
+        time.sleep(0.1)
+    raise AssertionError(f"{address} did not settle in {patience} s")

@@ -129,7 +129,7 @@ def test_what_is_missing_or_damaged_is_run_again(small, undisturbed, tmp_path):
     kept = parts[1].stat().st_mtime_ns
     parts[0].unlink()
     parts[2].write_bytes(parts[2].read_bytes()[:500])
-    parts[3].with_name("part-000000.99.part").write_bytes(b"half")
+    parts[3].with_name(".stickslip-0123.part").write_bytes(b"half")
     manifest = execute.run(small, tmp_path, jobs=2)
     assert manifest["timings"]["blocks_computed"] == 2
     assert parts[1].stat().st_mtime_ns == kept

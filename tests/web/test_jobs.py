@@ -6,11 +6,13 @@ import asyncio
 import sys
 from collections.abc import Coroutine
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from stickslip.web.jobs import Job, Jobs
+from stickslip.web.projects import Project
 
 SCRIPT = """
 import json, sys, time
@@ -44,7 +46,8 @@ def apart(work: Coroutine[Any, Any, Any]) -> Any:
 async def ended(first: dict[str, Any]) -> tuple[Job, list[dict[str, Any]]]:
     """A job of 4 s with a limit of 2.5 s, when it has ended, and what it showed."""
     jobs, shown = Scripted(first), list[dict[str, Any]]()
-    job = jobs.start("p", "read", "Reading", {}, limit=2.5, meanwhile=shown.append)
+    project = Project(Path("2026-01-01-00000000"))
+    job = jobs.start(project, "read", "Reading", {}, limit=2.5, meanwhile=shown.append)
     async for _ in job.lines():
         pass
     await jobs.close()
@@ -65,7 +68,7 @@ def test_a_job_that_shows_nothing_is_ended() -> None:
     """A file on which a reader never comes to an end."""
     job, shown = apart(ended({"tell": "reading"}))
     assert job.state == "failed"
-    assert "found no end in 2 s" in job.error
+    assert "timed out after 2 s" in job.error
     assert not shown
     assert job.process is not None
     assert job.process.returncode is not None

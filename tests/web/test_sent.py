@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.approval import approved_file
-from support.serving import Served, drop, ended
+from support.serving import Served, drop, ended, settled
 
 COULOMB = Path(str(ss.law("coulomb").step.__code__.co_filename)).read_text(encoding="utf-8")
 MODEL = 'law = "sent.py"\n[parameters]\nfc = 0.3\nsigma2 = 0.01\n[axis]\ninertia = 4e-4\n'
@@ -76,45 +77,39 @@ def test_code_is_shown_and_does_not_run(served: Served, law: tuple[str, Path], t
 
 
 @pytest.mark.slow
-def test_approved_code_runs_for_this_item_alone(served: Served, law: tuple[str, Path]) -> None:
-    """The same bytes ask again in another project, and in the same one; the command line has learned nothing."""
+def test_approved_code_is_approved_for_this_user(served: Served, law: tuple[str, Path]) -> None:
+    """The same bytes run in other projects and on the command line; other bytes ask again."""
     code, mark = law
     client = served.client()
     base = project_of(client)
     address, about = looked_at(client, base, RUN, code)
-    before = approved_file().read_text() if approved_file().is_file() else ""
     sha = about["asks"]["sha256"]
+    assert sha not in (approved_file().read_text() if approved_file().is_file() else "")
     job = client.post(f"{address}/approval", json={"sha256": sha}).json()["job"]
     assert ended(client, base.rpartition("/")[2], job, 300.0)["state"] == "done"
     assert client.get(address).json()["state"] == "ready"
     assert mark.exists()
-    mark.unlink()
+    assert sha in approved_file().read_text()
     assert client.post(f"{address}/approval", json={"sha256": sha}).status_code == 409
-    for other in (base, project_of(client)):
-        assert looked_at(client, other, RUN, code)[1]["state"] == "asks"
-    assert not mark.exists()
-    assert (approved_file().read_text() if approved_file().is_file() else "") == before
+    other = project_of(client)
+    assert looked_at(client, other, RUN, code)[1]["state"] == "ready"
+    assert looked_at(client, other, RUN, f"{code}#\n")[1]["state"] == "asks"
 
 
-def test_what_the_command_line_approved_still_asks(
-    served: Served, law: tuple[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """An approval is of one item; the file of the command line counts for nothing in the page."""
-    from stickslip.approval import allow_code, demand
-    from stickslip.errors import CodeRefused
-
-    code = law[0].encode()
-    monkeypatch.setenv("STICKSLIP_CONFIG", str(tmp_path / "config"))
-    approved_file().parent.mkdir()
-    approved_file().write_text(hashlib.sha256(code).hexdigest() + "  sent.py\n")
-    demand("sent.py", code, "x.toml: law")
-    with allow_code([]), pytest.raises(CodeRefused) as refused:
-        demand("sent.py", code, "x.toml: law")
-    assert (refused.value.path, refused.value.code) == ("sent.py", code)
-    with allow_code([hashlib.sha256(code).hexdigest()]):
-        demand("sent.py", code, "x.toml: law")
-        with pytest.raises(CodeRefused):
-            demand("sent.py", code + b"#", "x.toml: law")
+def test_code_that_cannot_be_shown_is_refused(served: Served) -> None:
+    """What would run differs from what is shown if the code is not UTF-8."""
+    client = served.client()
+    base = project_of(client)
+    address, _ = looked_at(client, base, MODEL, f"x = {served.url!r}\n")
+    folder = served.folder / base.rpartition("/")[2] / "models" / address.rpartition("/")[2]
+    (folder / "sent.py").write_bytes(b"# coding: latin-1\nx = '\xe4'\n")
+    model = address.rpartition("/")[2]
+    (folder / "about.json").write_text(json.dumps({"name": "mine", "state": "done"}))
+    job = client.post(f"{base}/exports", json={"model": model, "to": "c99"}).json()["job"]
+    assert ended(client, base.rpartition("/")[2], job, 300.0)["state"] == "failed"
+    about = settled(client, address)
+    assert about["state"] == "failed"
+    assert "sent.py is not UTF-8" in about["problem"]
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import gc
 import importlib
+import math
 import os
 import re
 import sys
@@ -19,8 +20,19 @@ from typing import Any, NoReturn
 
 from stickslip import compiling, waiting
 from stickslip.approval import allow_code
-from stickslip.errors import InputError, Interrupted, ModelRemark, StickslipError, suggestion
+from stickslip.errors import (
+    BEYOND,
+    InputError,
+    Interrupted,
+    ModelRemark,
+    StickslipError,
+    UnusedPlace,
+    beyond,
+    one_line,
+    suggestion,
+)
 from stickslip.in_python import with_options
+from stickslip.rules import LARGEST_WHOLE
 from stickslip.verbs.kinds import require
 
 VERBS = (
@@ -61,11 +73,18 @@ WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 they are read."""
 
 
+REMARKS = (ModelRemark, UnusedPlace)
+"""Warnings that the command line prints in one line."""
 OPTION = re.compile(r"--([a-z][a-z-]*)")
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that complains in one line."""
+    """An argument parser that complains in one line, and takes numbers that a machine can have."""
+
+    def __init__(self, *args: Any, **named: Any) -> None:
+        super().__init__(*args, **named)
+        self.register("type", int, whole_number)
+        self.register("type", float, real_number)
 
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing the usage."""
@@ -81,6 +100,45 @@ class Parser(argparse.ArgumentParser):
                 near = re.sub("'(.*?)'", r"--\1", remedy)
                 raise InputError(f"`{self.prog}` has no option --{name}; {near}")
         return known, rest
+
+
+def whole_number(text: str) -> int:
+    """Read an option of `type=int`.
+
+    Raises
+    ------
+    ValueError
+        Of a text that is no whole number.
+    ArgumentTypeError
+        Of one that no counter holds.
+    """
+    number = int(text)
+    if abs(number) >= LARGEST_WHOLE:
+        raise argparse.ArgumentTypeError(f"{text[:20]}... is too large; give a smaller number")
+    return number
+
+
+def real_number(text: str) -> float:
+    """Read an option of `type=float`; ``inf`` is for options that allow it.
+
+    Raises
+    ------
+    ValueError
+        Of a text that is no number.
+    ArgumentTypeError
+        Of NaN, and of one that is too large or too small to be computed with.
+    """
+    number = float(text)
+    digits = text.lower().partition("e")[0]
+    if math.isnan(number):
+        raise argparse.ArgumentTypeError(f"{text} is not a number; give one, or leave the option out")
+    if math.isinf(number) and any(c.isdigit() for c in digits):
+        raise argparse.ArgumentTypeError(f"{text[:40]} is too large; give a smaller number")
+    if number == 0.0 and any(c in "123456789" for c in digits):
+        raise argparse.ArgumentTypeError(
+            f"{text[:40]} is too small to be distinguished from 0; give a larger number"
+        )
+    return number
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -111,12 +169,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader (`| head`) has gone; Python would complain once more when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
+    except BEYOND as error:
+        return _complain(as_given(str(beyond(error)), given), 2)
     finally:
         notice.close()
 
 
 def _tell(line: str) -> None:
     """A line on stderr, above a bar if there is one."""
+    line = one_line(line)
     if "tqdm" in sys.modules:
         sys.modules["tqdm"].tqdm.write(f"stickslip: {line}", file=sys.stderr)
     else:
@@ -166,6 +227,11 @@ def _dispatch(argv: list[str]) -> int:
     # Only the verb that is called is imported; all of them where help or a complaint lists them.
     if argv and not argv[0].startswith("-") and argv[0] not in VERBS:
         raise InputError(f"unknown verb {argv[0]!r}; {suggestion(argv[0], VERBS)}")
+    if any("\0" in word for word in argv):
+        raise InputError("an argument contains a NUL character, which no name or number has; remove it")
+    if odd := next((word for word in argv if OPTION.match(word) and word.partition("=")[2] == "--"), ""):
+        # argparse drops these two dashes and hands an empty list to the verb.
+        raise InputError(f"{odd}: -- is no value; give one, or leave the option out")
     parser = parser_of(argv[:1] if argv and argv[0] in VERBS else VERBS)
     try:
         args: Any = parser.parse_args(argv)
@@ -199,14 +265,15 @@ def _check_kinds(args: argparse.Namespace) -> None:
 
 @contextmanager
 def _remarks() -> Generator[None]:
-    """Print remarks on models on stderr, each once and in one line."""
+    """Print remarks on models and places on stderr, each once and in one line."""
     said: set[str] = set()
     with warnings.catch_warnings():
-        warnings.simplefilter("always", ModelRemark)
+        for kind in REMARKS:
+            warnings.simplefilter("always", kind)
         otherwise = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *rest: Any) -> None:
-            if not issubclass(category, ModelRemark):
+            if not issubclass(category, REMARKS):
                 otherwise(message, category, *rest)
             elif str(message) not in said:
                 said.add(str(message))
@@ -225,7 +292,7 @@ def as_given(message: str, argv: Sequence[str]) -> str:
 
 def _complain(what: object, code: int) -> int:
     """Print one line on stderr, whatever the message holds."""
-    print("stickslip: " + " ".join(str(what).split()), file=sys.stderr)
+    print(f"stickslip: {one_line(str(what))}", file=sys.stderr)
     return code
 
 

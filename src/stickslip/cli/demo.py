@@ -33,7 +33,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the three verbs, each with its command."""
-    from stickslip.study.files import prepared_folder
+    from stickslip.whole_files import prepared_folder
 
     log: Path = args.log or args.out / "demo.csv"
     prepared_folder(log.parent)
@@ -75,17 +75,12 @@ def copy_log(log: Path, force: bool) -> None:
     InputError
         If it cannot be written, or would replace a file that is not stickslip's own.
     """
-    import shutil
-    from importlib.resources import as_file, files
+    from importlib.resources import files
 
-    from stickslip.errors import InputError
+    from stickslip.whole_files import write_whole
 
     _files.refuse_foreign([log], force)
-    try:
-        with as_file(files("stickslip") / "demo.csv") as shipped:
-            shutil.copyfile(shipped, log)
-    except OSError as error:
-        raise InputError(f"{log} cannot be written ({error.strerror}); choose another place") from None
+    write_whole(log, (files("stickslip") / "demo.csv").read_bytes())
     _files.written([log])
 
 

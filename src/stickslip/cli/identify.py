@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip.cli import _files, _reading
+from stickslip.errors import one_line
 from stickslip.identify.methods import METHODS
 
 if TYPE_CHECKING:
@@ -271,7 +272,7 @@ def options_of(args: argparse.Namespace) -> dict[str, Any]:
 
 def tell(line: str) -> None:
     """What is odd about a log, before anything is computed."""
-    print(f"stickslip: {line}", file=sys.stderr)
+    print(f"stickslip: {one_line(line)}", file=sys.stderr)
 
 
 def as_data(result: IdentificationResult, made: Mapping[str, Path], answers: Answers) -> dict[str, Any]:
@@ -286,7 +287,7 @@ def as_data(result: IdentificationResult, made: Mapping[str, Path], answers: Ans
 
 def places(out: Path) -> tuple[Path, Path]:
     """The files of model and report; the folder is made."""
-    from stickslip.study.files import prepared_folder
+    from stickslip.whole_files import prepared_folder
 
     if out.suffix == ".toml":
         prepared_folder(out.parent)

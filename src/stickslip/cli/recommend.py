@@ -222,7 +222,7 @@ def writable(out: Path, model: Path) -> None:
     InputError
     """
     from stickslip.errors import InputError
-    from stickslip.study.files import prepared_folder
+    from stickslip.whole_files import prepared_folder
 
     if out.resolve() == model.resolve():
         raise InputError(f"--out {out} is the model itself; give another name, such as recommended.toml")

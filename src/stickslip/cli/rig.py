@@ -142,10 +142,10 @@ def performed(args: argparse.Namespace) -> int:
     """`stickslip rig run`."""
     from stickslip.cli import _output
     from stickslip.config import named_values
-    from stickslip.errors import InputError, unwritable
+    from stickslip.errors import InputError
     from stickslip.rigs.procedures import procedure
     from stickslip.rigs.procedures.base import perform, planned
-    from stickslip.study.files import prepared_folder
+    from stickslip.whole_files import prepared_folder
 
     kind = procedure(args.procedure)
     given = named_values(args.set, "--set")
@@ -166,10 +166,7 @@ def performed(args: argparse.Namespace) -> int:
         chosen, rig, path=args.stream, progress=_output.say, without_watchdog=args.no_watchdog,
         realtime=args.realtime or None,
     )  # fmt: skip
-    try:
-        result.record.save(out)
-    except OSError as error:
-        raise unwritable(out, error) from None
+    result.record.save(out)
     _files.written([out])
     return shown(result, out, args)
 
@@ -215,7 +212,7 @@ def commissioned(args: argparse.Namespace) -> int:
     from stickslip.commission.headline import headline
     from stickslip.commission.resume import RESULTS, claimed
     from stickslip.errors import InputError
-    from stickslip.study.files import prepared_folder
+    from stickslip.whole_files import prepared_folder
 
     rig = rig_of(args)
     if args.dry_run:

@@ -60,9 +60,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the record and print the metrics."""
     from stickslip.cli import _output
-    from stickslip.errors import InputError, unwritable
-    from stickslip.study.files import prepared_folder
+    from stickslip.errors import InputError
     from stickslip.study.study import execute, load_run
+    from stickslip.whole_files import prepared_folder
 
     planned = load_run(args.file)
     out: Path = args.out or Path(f"{args.file.stem}.npz")
@@ -72,10 +72,7 @@ def run(args: argparse.Namespace) -> int:
     planned.check()
     prepared_folder(out.parent)
     executed = execute(planned, check=True)
-    try:
-        executed.record.save(out)
-    except OSError as error:
-        raise unwritable(out, error) from None
+    executed.record.save(out)
     _files.written([out])
     if args.json:
         _output.print_json({**executed.record.meta, "record": str(out), "failure": executed.failure})

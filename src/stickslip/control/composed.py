@@ -203,7 +203,12 @@ class Composed:
         for f, path in sorted(fields, key=lambda pair: pair[0].per_element):
             owner = _at(z, path[:-1])
             before = getattr(owner, path[-1])
-            value = [float(next(numbers)) for _ in before] if f.per_element else float(next(numbers))
+            try:
+                value = [float(next(numbers)) for _ in before] if f.per_element else float(next(numbers))
+            except (StopIteration, TypeError):
+                raise ParameterError(
+                    f"Controller: flat has {len(flat)} values, which are no state; give what packed_state made"
+                ) from None
             setattr(owner, path[-1], value)
         return z
 

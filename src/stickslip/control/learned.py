@@ -17,6 +17,7 @@ from typing import Any, cast
 from stickslip.config import read_toml
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError
+from stickslip.whole_files import write_whole
 
 WIDTH = 1.96
 """Standard deviations of half an interval that holds 95 of 100 times."""
@@ -170,7 +171,4 @@ def write_table(path: Path, content: Mapping[str, Any]) -> None:
     """
     import tomli_w
 
-    try:
-        path.write_text(tomli_w.dumps(content), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}); give another path") from None
+    write_whole(path, tomli_w.dumps(content))

@@ -26,6 +26,7 @@ from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
 from stickslip.machines.two_inertias import TwoInertias
 from stickslip.model import MODEL_FORMAT, Model
+from stickslip.whole_files import write_whole
 
 
 def write_model(
@@ -58,14 +59,7 @@ def write_model(
     import tomli_w
 
     target = Path(path)
-    draft = target.with_name(target.name + ".part")
-    try:
-        with draft.open("wb") as file:
-            tomli_w.dump(model_content(found, data, _relative(law, target), more), file)
-        os.replace(draft, target)
-    except OSError as error:
-        raise InputError(f"{target} cannot be written ({error.strerror}); give another path") from None
-    return target
+    return write_whole(target, tomli_w.dumps(model_content(found, data, _relative(law, target), more)))
 
 
 def model_content(

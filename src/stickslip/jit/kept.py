@@ -6,15 +6,18 @@
 
 from __future__ import annotations
 
+import atexit
 import functools
 import hashlib
 import importlib.util
 import os
 import platform
 import re
+import shutil
 import sys
 import tempfile
 import threading
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +27,8 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.runtime.nrt import rtsys
 
 from stickslip import compiling
+from stickslip.errors import UnusedPlace
+from stickslip.ownership import exposure_of
 
 ROOMS = ("jit", "simulation", "machines", "rigs")
 """Rooms of the package that have kernels: what these are made of, with the constants that they hold."""
@@ -32,9 +37,10 @@ PACKAGE = Path(__file__).parent.parent
 
 @functools.cache
 def cache_folder(rooms: tuple[str, ...] = ROOMS) -> Path:
-    """The folder for compiled code of some rooms: STICKSLIP_CACHE, else the user's cache folder, else a temporary one.
+    """Return the folder for compiled code of some rooms: STICKSLIP_CACHE, else the user's cache folder.
 
-    It is named after the content of these rooms.
+    It is named after the content of these rooms. Its content is executed, so a folder that another user can change is
+    not used, with a warning: a temporary one takes its place, as for a folder that cannot be written.
     """
     digest = hashlib.sha256(f"{numba.__version__} {sys.version} {platform.machine()}".encode())
     for file in sorted(file for room in rooms for file in (PACKAGE / room).glob("**/*.py")):
@@ -44,12 +50,29 @@ def cache_folder(rooms: tuple[str, ...] = ROOMS) -> Path:
     )
     folder = Path(home) / digest.hexdigest()[:16]
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        exposure = exposure_of(folder)
+        if exposure:
+            warnings.warn(
+                f"compiled code is not read from {home}, as {exposure}; correct the owner and the mode (chmod go-w), "
+                "or set STICKSLIP_CACHE to a folder of your own",
+                UnusedPlace,
+                stacklevel=2,
+            )
+        elif os.access(folder, os.W_OK):
             return folder
     except OSError:
         pass
-    return Path(tempfile.mkdtemp(prefix="stickslip-"))
+    return _temporary_folder()
+
+
+@functools.cache
+def _temporary_folder() -> Path:
+    """Make a folder that only this user can read and that ends with this process."""
+    folder, owner = Path(tempfile.mkdtemp(prefix="stickslip-")), os.getpid()
+    # Processes that were forked from this one leave it alone.
+    atexit.register(lambda: shutil.rmtree(folder, ignore_errors=True) if os.getpid() == owner else None)
+    return folder
 
 
 class _Told(event.Listener):
@@ -121,6 +144,18 @@ class _Kept(FunctionCache):
                 return found
         return super().load_overload(sig, target_context)
 
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            _warn_not_kept(cache_folder(), error)
+
+
+def _warn_not_kept(folder: Path, error: OSError) -> None:
+    """Warn that code has to be compiled again by the next process."""
+    why = error.strerror or str(error)
+    warnings.warn(f"compiled code is not kept in {folder.parent} ({why})", UnusedPlace, stacklevel=3)
+
 
 decorating = threading.RLock()
 GENERATED = "stickslip._compiled."
@@ -136,6 +171,17 @@ def cached(compiled: Any, function: Any) -> Any:
     return compiled
 
 
+def _write_module(path: Path, text: str) -> None:
+    """Write a module by a draft of its own, so that no other process or thread reads half a file."""
+    draft = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.tmp")
+    try:
+        draft.write_text(text)
+        os.replace(draft, path)
+    except OSError:
+        draft.unlink(missing_ok=True)
+        raise
+
+
 def loaded(name: str, text: str) -> Any:
     """Import a generated module, written to a file so that its compiled code can be cached.
 
@@ -143,12 +189,15 @@ def loaded(name: str, text: str) -> Any:
     any change of the engines: it has a folder that such a change leaves as it is.
     """
     alone = set(_CALLED.findall(text)) <= {"stickslip.jit"}
-    path = cache_folder(ROOMS[:1] if alone else ROOMS) / f"{name}.py"
+    folder = cache_folder(ROOMS[:1] if alone else ROOMS)
+    path = folder / f"{name}.py"
     if not path.exists():
-        # Written aside and renamed, so that no other process or thread reads half a file.
-        draft = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.tmp")
-        draft.write_text(text)
-        os.replace(draft, path)
+        try:
+            _write_module(path, text)
+        except OSError as error:
+            _warn_not_kept(folder, error)
+            path = _temporary_folder() / path.name
+            _write_module(path, text)
     spec = importlib.util.spec_from_file_location(f"{GENERATED}{name}", path)
     assert spec is not None
     assert spec.loader is not None

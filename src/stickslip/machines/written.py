@@ -8,7 +8,7 @@ from dataclasses import MISSING
 from pathlib import Path
 from typing import Any
 
-from stickslip.errors import InputError, ParameterError, unwritable
+from stickslip.errors import InputError, ParameterError
 from stickslip.machines.contact import Contact
 from stickslip.machines.described import numbers_of
 from stickslip.machines.encoder import Encoder
@@ -17,6 +17,7 @@ from stickslip.machines.machine import Machine, Sensor
 from stickslip.machines.motor import Amplifier
 from stickslip.machines.two_mass import TwoMassAxis
 from stickslip.model_tables import written
+from stickslip.whole_files import write_whole
 
 ALWAYS = ("sample_time",)
 """Written even where they are as usual."""
@@ -123,11 +124,7 @@ def write_machine(machine: Machine, path: str | os.PathLike[str]) -> Path:
         raise InputError(
             f"{target}: a machine's file is known by its ending; name it {target.stem or 'machine'}.toml"
         )
-    try:
-        target.write_text(machine_text(machine), encoding="utf-8")
-    except OSError as error:
-        raise unwritable(target, error) from None
-    return target
+    return write_whole(target, machine_text(machine))
 
 
 # ---- a file to begin from ------------------------------------------------------------------------------------------

@@ -19,11 +19,12 @@ import numpy as np
 
 from stickslip.config import Table as Section
 from stickslip.config import read_toml
-from stickslip.errors import InputError
+from stickslip.errors import unwritable
 from stickslip.readers._choose import parse_mapping
 from stickslip.readers.convert import TURNING, Drive
 from stickslip.readers.table_columns import Table
 from stickslip.record import Record
+from stickslip.whole_files import write_whole
 
 PUTS_OUT = {"force_constant": TURNING, **dict.fromkeys(TURNING, ("force_constant",))}
 """What is said now of a linear motor takes the place of what a profile says of one that turns, and the other way."""
@@ -215,14 +216,9 @@ def save(profile: Profile, table: Table, path: Path | None = None) -> Path:
         lines += [f"seen.{key} = {value:.4g}" for key, value in said.seen.items()]
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        draft = target.with_name(target.name + ".part")
-        draft.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        os.replace(draft, target)
     except OSError as error:
-        raise InputError(
-            f"cannot write the profile {target} ({error.strerror or error}); name another file with --profile"
-        ) from None
-    return target
+        raise unwritable(target, error, "--profile") from None
+    return write_whole(target, "\n".join(lines) + "\n", "--profile")
 
 
 def _comment(text: str) -> str:

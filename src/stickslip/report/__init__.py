@@ -65,7 +65,7 @@ def write(result: StudyResult) -> Path:
     from stickslip.errors import unwritable
     from stickslip.report._view import StudyView
     from stickslip.report.html import render
-    from stickslip.report.page import replaced
+    from stickslip.whole_files import write_whole
 
     view = StudyView(result)
     target = result.folder / "report.html"
@@ -73,4 +73,4 @@ def write(result: StudyResult) -> Path:
         html = render(view, draw(result))
     except OSError as error:
         raise unwritable(target, error) from None
-    return replaced(target, html)
+    return write_whole(target, html)

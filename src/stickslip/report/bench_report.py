@@ -12,9 +12,10 @@ from typing import Any
 
 from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.learned import told
-from stickslip.report.page import filled, replaced
+from stickslip.report.page import filled
 from stickslip.study.bench import BenchResult, BenchRun
 from stickslip.study.bench_decision import CONDITIONS, LATE, USUAL, Choice, Standing, choices, standings
+from stickslip.whole_files import write_whole
 
 WIDTH, LEFT, ROW, TOP = 760.0, 190.0, 15.0, 46.0
 """Of a picture, px: width, room for names, height of a row, room for the title."""
@@ -53,7 +54,7 @@ def write_bench_report(result: BenchResult) -> Path:
         failed=sum(bool(r.failure) for r in result.runs),
         conditions=list(CONDITIONS), choices=table_of(choices(result.runs)), machines=machines,
     )  # fmt: skip
-    return replaced(result.folder / "report.html", html)
+    return write_whole(result.folder / "report.html", html)
 
 
 def learned_on(machine: str, runs: Sequence[BenchRun]) -> list[dict[str, str]]:

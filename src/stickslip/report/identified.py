@@ -19,9 +19,10 @@ from stickslip.report.answers import answers_of, meaning_of, one_number_each, sp
 from stickslip.report.axis_evidence import judgements
 from stickslip.report.axis_pictures import data_pictures, pictures_of
 from stickslip.report.identification import HEIGHT, panel_of
-from stickslip.report.page import filled, replaced
+from stickslip.report.page import filled
 from stickslip.report.sliding_torque import sliding_of
 from stickslip.report.svg import embedded_svg
+from stickslip.whole_files import write_whole
 
 TABLE = 15
 """Estimates beyond which a table of all correlations is too wide to read."""
@@ -93,7 +94,7 @@ def write_identification(
         If the file cannot be written.
     """
     model = Path(model_file) if model_file is not None else Path(path).with_name("model.toml")
-    return replaced(Path(path), rendered(found, sources, title, versions or {}, headline, model))
+    return write_whole(Path(path), rendered(found, sources, title, versions or {}, headline, model))
 
 
 def rendered(

@@ -23,6 +23,7 @@ from stickslip.report.plots import DATES, DPI, FORMATS, RC, WIDTH, Array, Curve,
 from stickslip.report.styles import Style
 from stickslip.simulation.prescribed.motion import Samples, packed_numbers, torque_along
 from stickslip.spec import Law
+from stickslip.whole_files import draft_of
 
 USUAL_VELOCITY = 0.01  # rad/s, for a law that declares no scale: the thesis's Stribeck velocity
 USUAL_DISTANCE = 1e-4  # rad, for a law without pre-sliding
@@ -206,7 +207,8 @@ def draw_gallery(models: Sequence[Model], path: Path) -> None:
             )
         # No date in the file: the same laws give the same bytes.
         undated = {"metadata": {DATES[path.suffix]: None}} if path.suffix in DATES else {}
-        figure.savefig(path, dpi=DPI, **undated)
+        with draft_of(path, "--plot") as draft:
+            figure.savefig(draft, format=path.suffix[1:], dpi=DPI, **undated)
 
 
 def _sketch(axes: Any, x: Array, y: Array, word: str) -> None:

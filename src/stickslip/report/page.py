@@ -1,12 +1,9 @@
-"""A report as one HTML file that needs nothing but itself: the templates filled, and the file put in place whole."""
+"""A report as one HTML file that needs nothing but itself: its filled template."""
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
 from typing import Any
 
-from stickslip.errors import unwritable
 from stickslip.report.plots import tied
 
 
@@ -19,20 +16,3 @@ def filled(template: str, **values: Any) -> str:
     )  # fmt: skip
     environment.filters["tied"] = tied
     return environment.get_template(template).render(**values)
-
-
-def replaced(target: Path, html: str) -> Path:
-    """Write the file in one move, so that an older one stays whole until then; returns it.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
-    draft = target.with_name(target.name + ".part")
-    try:
-        draft.write_text(html, encoding="utf-8")
-        os.replace(draft, target)
-    except OSError as error:
-        raise unwritable(target, error) from None
-    return target

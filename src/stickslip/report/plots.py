@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.errors import unwritable
 from stickslip.report.styles import MARKS, Style
+from stickslip.whole_files import draft_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -192,12 +193,10 @@ def save(
             undated = {"metadata": {DATES[target.suffix]: None}} if target.suffix in DATES else {}
             try:
                 target.parent.mkdir(parents=True, exist_ok=True)
-                figure.savefig(target, format=target.suffix[1:], dpi=DPI, **undated)
             except OSError as error:
-                why = error.strerror or error
-                raise InputError(
-                    f"cannot write {target} ({why}); choose another place with {option}"
-                ) from None
+                raise unwritable(target, error, option) from None
+            with draft_of(target, option) as draft:
+                figure.savefig(draft, format=target.suffix[1:], dpi=DPI, **undated)
 
 
 def embedded(file: Path) -> dict[str, Any]:

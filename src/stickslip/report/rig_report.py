@@ -13,12 +13,13 @@ import numpy as np
 from stickslip.errors import unwritable
 from stickslip.report.conclusions import rig_conclusion
 from stickslip.report.html import image
-from stickslip.report.page import filled, replaced
+from stickslip.report.page import filled
 from stickslip.report.plots import Curve, Panel, draw, envelope
 from stickslip.report.styles import REFERENCE, style_of
 from stickslip.study.experiments import Experiment, ExperimentView, experiments_of
 from stickslip.study.result import Run, StudyResult
 from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share
+from stickslip.whole_files import write_whole
 
 MARKS = {True: ("yes", "holds"), False: ("no", "does not hold"), None: ("open", "not run")}
 WINDOWS = {"low": (2.5, 5.0), "high": (0.0, 20.0), "step": (0.0, 1.5)}
@@ -188,4 +189,4 @@ def write_rig_report(result: StudyResult) -> Path:
         stopped=[run for run in result.runs if run.failure and run.key in nominal],
         manifest=json.dumps({k: v for k, v in result.manifest.items() if k != "runs"}, indent=1),
     )
-    return replaced(target, html)
+    return write_whole(target, html)

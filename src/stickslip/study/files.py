@@ -6,8 +6,6 @@ import csv
 import importlib
 import json
 import math
-import os
-import shutil
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
@@ -16,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.errors import InputError, unwritable
+from stickslip.errors import InputError
 from stickslip.record import Record
 from stickslip.study.provenance import engine_hash, file_hash, versions
 from stickslip.study.result import Run
+from stickslip.whole_files import draft_of, prepared_folder, write_whole
 
 if TYPE_CHECKING:
     from stickslip.study.plan import Study
@@ -30,27 +29,10 @@ KINDS = ("study", "sweep", "tune")
 MARK = ".stickslip-results"
 """File that says whose results a folder holds, from before the first of them"""
 PLACES = (
-    "manifest.json", "metrics.csv", "metrics.parquet", "summary.csv", "report.html", "inputs", "figures", "records",
-    "data", "variants",
+    "manifest.json", "metrics.csv", "metrics.parquet", "summary.csv", "report.html", "results.jsonl", "*-tuned.json",
+    "*-tried.csv", "inputs", "figures", "records", "data", "variants",
 )  # fmt: skip
-"""Where results go: what lies there and is not ours is not written over"""
-
-
-def prepared_folder(folder: Path) -> Path:
-    """Make the folder and try to write into it, before anything is computed.
-
-    Raises
-    ------
-    InputError
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".stickslip"
-        probe.write_text("")
-        probe.unlink()
-    except OSError as error:
-        raise unwritable(folder, error) from None
-    return folder
+"""Patterns of the names of results: what is there and is not ours is not overwritten"""
 
 
 def claim_folder(folder: Path, name: str, kind: str = "study") -> Path:
@@ -71,21 +53,18 @@ def claim_folder(folder: Path, name: str, kind: str = "study") -> Path:
     """
     found = _owner(folder)
     if found is None:
-        for place in PLACES:
-            if (folder / place).is_file() or any(_inside(folder / place)):
+        for place in (found for pattern in PLACES for found in folder.glob(pattern)):
+            if place.is_file() or any(_inside(place)):
                 raise InputError(
-                    f"{folder} holds {place} already, which no {kind} of stickslip wrote; choose another place with "
-                    "--out, or move it away"
+                    f"{folder} holds {place.name} already, which no {kind} of stickslip wrote; choose another place "
+                    "with --out, or move it away"
                 )
     elif found != (kind, name):
         raise InputError(
             f"{folder} holds the {found[0]} {found[1]!r}; choose another place with --out, or delete it"
         )
     prepared_folder(folder)
-    try:
-        (folder / MARK).write_text(json.dumps({kind: name}), encoding="utf-8")
-    except OSError as error:
-        raise unwritable(folder, error) from None
+    write_whole(folder / MARK, json.dumps({kind: name}))
     return folder
 
 
@@ -116,11 +95,8 @@ def record_path(folder: Path, planned: PlannedRun) -> Path:
 def keep_record(folder: Path, planned: PlannedRun, record: Record) -> Path:
     """Write the record of a run. Returns its path."""
     path = record_path(folder, planned)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return record.save(path)
-    except OSError as error:
-        raise unwritable(path, error) from None
+    prepared_folder(path.parent)
+    return record.save(path)
 
 
 def find_run(folder: Path, planned: PlannedRun) -> Run | None:
@@ -158,14 +134,9 @@ def write_metrics(folder: Path, runs: Sequence[Run]) -> None:
     """Write metrics.csv (exact decimals; empty where there is no number) and metrics.parquet, one row a run."""
     names = metric_names(runs)
     rows = [[getattr(run, key) for key in KEYS] + [_cell(run.metrics.get(n)) for n in names] for run in runs]
-    draft = folder / "metrics.csv.part"
-    try:
-        with draft.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows([[*KEYS, *names], *rows])
-        os.replace(draft, folder / "metrics.csv")
-        _write_parquet(folder, runs, names)
-    except OSError as error:
-        raise unwritable(folder, error) from None
+    with draft_of(folder / "metrics.csv") as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([[*KEYS, *names], *rows])
+    _write_parquet(folder, runs, names)
 
 
 def _cell(value: float | None) -> str:
@@ -177,9 +148,8 @@ def _write_parquet(folder: Path, runs: Sequence[Run], names: Sequence[str]) -> N
     parquet: Any = importlib.import_module("pyarrow.parquet")
     columns = [_text_column(pyarrow, [getattr(run, key) for run in runs]) for key in KEYS]
     columns += [_number_column(pyarrow, [run.metrics.get(name, math.nan) for run in runs]) for name in names]
-    draft = folder / "metrics.parquet.part"
-    parquet.write_table(pyarrow.Table.from_arrays(columns, names=[*KEYS, *names]), draft)
-    os.replace(draft, folder / "metrics.parquet")
+    with draft_of(folder / "metrics.parquet") as draft:
+        parquet.write_table(pyarrow.Table.from_arrays(columns, names=[*KEYS, *names]), draft)
 
 
 # From buffers, since `pyarrow.array` imports pandas wherever it is installed.
@@ -229,20 +199,15 @@ def save_manifest(
 
     It begins with what it is of, and with what the numbers come from.
     """
-    try:
-        manifest: dict[str, Any] = {
-            **named,
-            "written": datetime.now(UTC).isoformat(timespec="seconds"),
-            "versions": versions(),
-            "engine_sha256": engine_hash(),
-            "inputs": copy_inputs(folder, inputs),
-            **content,
-        }
-        draft = folder / "manifest.json.part"
-        draft.write_text(json.dumps(manifest, indent=1, default=str), encoding="utf-8")
-        os.replace(draft, folder / "manifest.json")
-    except OSError as error:
-        raise unwritable(folder, error) from None
+    manifest: dict[str, Any] = {
+        **named,
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": versions(),
+        "engine_sha256": engine_hash(),
+        "inputs": copy_inputs(folder, inputs),
+        **content,
+    }
+    write_whole(folder / "manifest.json", json.dumps(manifest, indent=1, default=str))
     return manifest
 
 
@@ -261,13 +226,12 @@ def _entry(folder: Path, planned: PlannedRun, run: Run, study: Study) -> dict[st
 
 def copy_inputs(folder: Path, files: Sequence[tuple[str, Path]]) -> list[dict[str, str]]:
     """Copy files to inputs/, the first under its own name; path as written, copy and SHA-256 of each."""
-    target = folder / "inputs"
-    target.mkdir(exist_ok=True)
+    target = prepared_folder(folder / "inputs")
     inputs: list[dict[str, str]] = []
     for i, (written, path) in enumerate(files):
         copy = target / (path.name if i == 0 else f"{i}-{path.name}")
         if copy.resolve() != path.resolve():
-            shutil.copyfile(path, copy)
+            write_whole(copy, path.read_bytes())
         inputs.append(
             {"written": written, "copy": copy.relative_to(folder).as_posix(), "sha256": file_hash(copy)}
         )

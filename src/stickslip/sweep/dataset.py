@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import importlib
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from stickslip.errors import InputError, unwritable
 from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.block import Block
 from stickslip.sweep.plan import Sweep
+from stickslip.whole_files import DRAFTS, draft_of
 
 OVERHEAD = 4000
 """Bytes that a file of a block takes besides its rows."""
@@ -89,12 +89,10 @@ def keep_block(folder: Path, sweep: Sweep, block: Block) -> None:
     ).encode()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Another command may write the same block; each has a draft of its own.
-        draft = path.with_suffix(f".{os.getpid()}.part")
-        parquet.write_table(table.replace_schema_metadata({KEY: about}), draft)
-        os.replace(draft, path)
     except OSError as error:
         raise unwritable(path, error) from None
+    with draft_of(path) as draft:
+        parquet.write_table(table.replace_schema_metadata({KEY: about}), draft)
 
 
 def _numbers(pyarrow: Any, values: Any) -> Any:
@@ -107,7 +105,7 @@ def _numbers(pyarrow: Any, values: Any) -> Any:
 
 def clear_drafts(folder: Path) -> None:
     """Remove what a killed command left half written."""
-    for draft in (folder / "data").rglob("part-*.part"):
+    for draft in (folder / "data").rglob(DRAFTS):
         draft.unlink(missing_ok=True)
 
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from stickslip.errors import unwritable
 from stickslip.study.files import KEYS
 from stickslip.sweep.checked_numbers import not_varied, not_varied_lines
 from stickslip.sweep.dataset import read
 from stickslip.sweep.plan import Sweep
+from stickslip.whole_files import draft_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 PERCENTILES = (5, 50, 95, 100)
@@ -60,15 +59,10 @@ def summarise(folder: Path, sweep: Sweep) -> list[dict[str, Any]]:
 def write_summary(folder: Path, sweep: Sweep, rows: Sequence[Mapping[str, Any]]) -> Path:
     """Write summary.csv, one row a run. Returns its path."""
     path = folder / "summary.csv"
-    draft = folder / "summary.csv.part"
-    try:
-        with draft.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
-        os.replace(draft, path)
-    except OSError as error:
-        raise unwritable(path, error) from None
+    with draft_of(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
     return path
 
 

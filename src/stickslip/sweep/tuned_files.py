@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 from pathlib import Path
 
-from stickslip.errors import unwritable
 from stickslip.sweep.plan import Sweep
 from stickslip.sweep.tune import Tuned
+from stickslip.whole_files import draft_of, write_whole
 
 
 def write(folder: Path, sweep: Sweep, tuned: Tuned) -> list[Path]:
@@ -17,25 +16,20 @@ def write(folder: Path, sweep: Sweep, tuned: Tuned) -> list[Path]:
     stem = tuned.run.key.replace("/", "-")
     table, chosen = folder / f"{stem}-tried.csv", folder / f"{stem}-tuned.json"
     heads = [*tuned.names, *(f"{name}_p{sweep.percentile:g}" for name in sweep.metrics)]
-    try:
-        with table.with_suffix(".part").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(heads)
-            writer.writerows([*a, *b] for a, b in zip(tuned.tried.tolist(), tuned.scores.tolist()))
-        os.replace(table.with_suffix(".part"), table)
-        content = {
-            "run": tuned.run.key,
-            "percentile": sweep.percentile,
-            "settings": dict(zip(tuned.names, tuned.after.tolist())),
-            "gains": tuned_gains(tuned),
-            "at_bounds": dict(tuned.at_bounds),
-            "metrics": dict(zip(sweep.metrics, tuned.scores_after.tolist())),
-            "metrics_before": dict(zip(sweep.metrics, tuned.scores_before.tolist())),
-        }
-        chosen.with_suffix(".part").write_text(json.dumps(content, indent=1), encoding="utf-8")
-        os.replace(chosen.with_suffix(".part"), chosen)
-    except OSError as error:
-        raise unwritable(folder, error) from None
+    with draft_of(table) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(heads)
+        writer.writerows([*a, *b] for a, b in zip(tuned.tried.tolist(), tuned.scores.tolist()))
+    content = {
+        "run": tuned.run.key,
+        "percentile": sweep.percentile,
+        "settings": dict(zip(tuned.names, tuned.after.tolist())),
+        "gains": tuned_gains(tuned),
+        "at_bounds": dict(tuned.at_bounds),
+        "metrics": dict(zip(sweep.metrics, tuned.scores_after.tolist())),
+        "metrics_before": dict(zip(sweep.metrics, tuned.scores_before.tolist())),
+    }
+    write_whole(chosen, json.dumps(content, indent=1))
     return [table, chosen]
 
 

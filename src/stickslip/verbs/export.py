@@ -28,7 +28,6 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 from stickslip.rules import with_article
 from stickslip.spec import Surroundings
-from stickslip.study.files import prepared_folder
 from stickslip.study.study import load_run
 from stickslip.verbs import own_files
 from stickslip.verbs.export_compensator import CompensatorOptions, compensator_of, recommendation_in
@@ -37,6 +36,7 @@ from stickslip.verbs.export_notes import around_of, axis_of, notes_on, notes_on_
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import require
 from stickslip.verbs.recommendation import RecommendationResult
+from stickslip.whole_files import prepared_folder, write_whole
 
 Source = (
     IdentificationResult | RecommendationResult | Model | Controller | PositionMap | str
@@ -94,9 +94,9 @@ class ExportResult:
         for path, content in zip(paths, self.files.values(), strict=True):
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(content if isinstance(content, bytes) else content.encode())
             except OSError as error:
                 raise unwritable(path, error) from None
+            write_whole(path, content)
         own_files.written(paths)
         return replace(self, paths=paths)
 

@@ -35,8 +35,8 @@ from stickslip.model import Model
 from stickslip.report.answers import Answers, answers_of
 from stickslip.report.identified import Source, files_of, write_identification
 from stickslip.report.result_text import interval_text, result_lines_in_python
-from stickslip.study.files import prepared_folder
 from stickslip.verbs import own_files
+from stickslip.whole_files import prepared_folder
 
 if TYPE_CHECKING:
     import pandas

@@ -302,7 +302,7 @@ def _listed(logs: Log | Sequence[Log]) -> list[Log]:
 
 def loops_of(loop: Loops, count: int) -> list[str]:
     """The text of the loop of every log: one for all, or one for each."""
-    if loop is None or loop == []:
+    if loop is None or (not isinstance(loop, (str, Mapping)) and len(loop) == 0):
         return [""] * count
     every = [loop] if isinstance(loop, (str, Mapping)) else list(loop)
     if len(every) > 1 and len(every) != count:

@@ -20,7 +20,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.learning import TimeTable, low_pass
 from stickslip.control.sample_time import sampled_by
 from stickslip.control.written import tables_of
-from stickslip.errors import InputError, unwritable
+from stickslip.errors import InputError
 from stickslip.machines.drivetrain import Drivetrain
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
@@ -29,7 +29,7 @@ from stickslip.record import Record
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, replay
 from stickslip.spec import Surroundings
-from stickslip.study.files import prepared_folder
+from stickslip.whole_files import prepared_folder, write_whole
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LARGEST = 1e6
@@ -102,11 +102,7 @@ class LearningResult:
         target = Path(path)
         prepared_folder(target.parent)
         content = {"axis": {"inertia": self.inertia}, **tables_of(self.controller)}
-        try:
-            target.write_text(tomli_w.dumps(content), encoding="utf-8")
-        except OSError as error:
-            raise unwritable(target, error) from None
-        return target
+        return write_whole(target, tomli_w.dumps(content))
 
 
 @arguments_checked
@@ -166,6 +162,16 @@ def learn(
     if repetitions < 1:
         raise InputError(f"learn: repetitions = {repetitions} must be at least 1")
     loop = _Repeated(axis, controller, reference, duration)
+    if corner is not None and not 1.0 / loop.duration <= corner <= 0.5 / loop.controller.sample_time:
+        raise InputError(
+            f"learn: corner = {corner:g} Hz must lie between {1.0 / loop.duration:g} Hz, one period per repetition, "
+            f"and {0.5 / loop.controller.sample_time:g} Hz, half the sample rate; leave it out to have it chosen"
+        )
+    if advance is not None and abs(advance) >= loop.count:
+        raise InputError(
+            f"learn: advance = {advance} must be below {loop.count}, the samples of a repetition; leave it out to have "
+            "it chosen"
+        )
     if over == "time":
         return _over_time(loop, repetitions, rate, corner, advance, progress)
     if corner is not None or advance is not None:

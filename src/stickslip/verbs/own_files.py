@@ -11,6 +11,9 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from stickslip.errors import InputError
+from stickslip.whole_files import write_whole
+
 LEDGER = ".stickslip-written"
 
 
@@ -29,11 +32,11 @@ def refuse_foreign(paths: Iterable[Path], force: bool = False) -> None:
     InputError
         That names the file and the option.
     """
-    from stickslip.errors import InputError
-
     for path in paths:
-        if not path.exists() or path.is_dir():
+        if not path.exists():
             continue
+        if path.is_dir():
+            raise InputError(f"{path} is a folder; give the name of a file")
         if not path.is_file():
             raise InputError(f"{path} is not a regular file; give another name")
         if not force and not ours(path):
@@ -60,8 +63,8 @@ def written(paths: Iterable[Path]) -> None:
         folders.setdefault(path.parent, _ledger(path.parent))[path.name] = _hash(path)
     for folder, known in folders.items():
         lines = [f"{digest}  {name}\n" for name, digest in known.items() if (folder / name).exists()]
-        with suppress(OSError):  # Then the next call asks for --force.
-            (folder / LEDGER).write_text("".join(lines), encoding="utf-8")
+        with suppress(InputError):  # Then the next call requires --force.
+            write_whole(folder / LEDGER, "".join(lines))
 
 
 def _ledger(folder: Path) -> dict[str, str]:

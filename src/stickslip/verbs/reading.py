@@ -368,7 +368,7 @@ def _cut(record: Record, reading: Reading) -> Record:
     if reading.get("unwrap"):
         record = unwrapped(record)
     ranges = reading.get("leave_out", ())
-    out = tuple(_rows("--leave-out", r) for r in ranges if r != "spikes")
+    out = tuple(_rows("--leave-out", r) for r in ranges if not (isinstance(r, str) and r == "spikes"))
     start, end, rows = reading.get("start"), reading.get("end"), reading.get("rows")
     part = cut(
         record,
@@ -379,7 +379,7 @@ def _cut(record: Record, reading: Reading) -> Record:
             out,
         ),
     )
-    if "spikes" in ranges:
+    if len(out) < len(ranges):
         from stickslip.identify.doctor.spikes import spike_rows
 
         part = cut(part, Cut(leave_out=tuple((n, n) for n in spike_rows(part).tolist())))

@@ -24,8 +24,8 @@ from stickslip.report.recommendation_text import (
     safety,
     without_friction,
 )
-from stickslip.study.files import prepared_folder
 from stickslip.verbs import own_files
+from stickslip.whole_files import prepared_folder
 
 
 @constructor_checked

@@ -9,8 +9,8 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 
 from stickslip.web.asking import Refused, Table, body, number, text
-from stickslip.web.identifying import approved
 from stickslip.web.projects import Item, NotThere, Project
+from stickslip.web.sent import ask_again
 from stickslip.web.site import Site
 
 
@@ -27,10 +27,9 @@ def table(site: Site) -> Table:
         archive = item.folder / "export.zip"
         archive.unlink(missing_ok=True)
         job = site.jobs.start(
-            project.id, "export", f"Exporting {item.about['name']}",
-            {"task": "export", "source": source, "to": text(data, "to"), "options": options, "out": str(archive),
-             "approved": approved(model) if model else []},
-            item=item.id, short=True, limit=300.0,
+            project, "export", f"Exporting {item.about['name']}",
+            {"task": "export", "source": source, "to": text(data, "to"), "options": options, "out": str(archive)},
+            item=item.id, short=True, limit=300.0, finish=lambda job: ask_again(site, project, [model], job),
         )  # fmt: skip
         return JSONResponse({"job": job.id}, 201)
 

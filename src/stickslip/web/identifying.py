@@ -13,6 +13,7 @@ from stickslip.control.own_loop import REFERENCE_VELOCITIES
 from stickslip.web.asking import Refused, Table, body, chosen_names, number, text
 from stickslip.web.jobs import Job
 from stickslip.web.projects import Item, Project, words
+from stickslip.web.sent import ask_again
 from stickslip.web.site import Site
 
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
@@ -25,15 +26,16 @@ def table(site: Site) -> Table:
 
 
 def begin(
-    site: Site, project: Project, item: Item, kind: str, title: str, request: dict[str, Any]
+    site: Site, project: Project, item: Item, kind: str, title: str, request: dict[str, Any], model: Item | None = None,
 ) -> Response:  # fmt: skip
-    """Start the job that makes an item, and keep in the item what came of it."""
+    """Start the job that makes an item, and keep in the item what came of it; `model` is what it is made from."""
 
     def finish(job: Job) -> None:
         if item.folder.is_dir():
             item.update(state=job.state, problem=job.error, **(job.result if job.state == "done" else {}))
+        ask_again(site, project, [model], job)
 
-    job = site.jobs.start(project.id, kind, title, {"task": kind, "folder": str(item.folder), **request},
+    job = site.jobs.start(project, kind, title, {"task": kind, "folder": str(item.folder), **request},
                           item=item.id, finish=finish)  # fmt: skip
     return JSONResponse({"id": item.id, "job": job.id}, 201)
 
@@ -62,10 +64,9 @@ def computing(site: Site) -> Table:
         name = words(data.get("name", ""), f"Setting for {model.about['name']}")
         name = project.free_name("settings", name)
         item = project.add("settings", name=name, model=model.id, options=options, state="running")
-        asked = {"model": str(model.folder / "model.toml"), "options": options, "approved": approved(model)}
-        return begin(
-            site, project, item, "recommend", f"Simulating settings for {model.about['name']}", asked
-        )
+        asked = {"model": str(model.folder / "model.toml"), "options": options}
+        title = f"Simulating settings for {model.about['name']}"
+        return begin(site, project, item, "recommend", title, asked, model)
 
     async def compare(request: Request) -> Response:
         project, data = site.project(request), await body(request)
@@ -74,10 +75,9 @@ def computing(site: Site) -> Table:
             raise Refused(400, "choose two models")
         names = [str(m.about["name"]) for m in models]
         paths = {k: str(m.folder / "model.toml") for k, m in zip(("first", "second"), models, strict=True)}
-        codes = [code for m in models for code in approved(m)]
-        asked = {"task": "compare", **paths, "names": names, "approved": codes}
-        job = site.jobs.start(project.id, "compare", f"Comparing {names[0]} and {names[1]}", asked, short=True,
-                              limit=300.0)  # fmt: skip
+        asked = {"task": "compare", **paths, "names": names}
+        job = site.jobs.start(project, "compare", f"Comparing {names[0]} and {names[1]}", asked, short=True,
+                              limit=300.0, finish=lambda job: ask_again(site, project, models, job))  # fmt: skip
         return JSONResponse({"job": job.id}, 201)
 
     return {
@@ -133,11 +133,6 @@ def logs_named(project: Project, data: dict[str, Any]) -> list[Item]:
         if not log.about.get("readable"):
             raise Refused(409, f"{log.about.get('name')} has not been read; see its problem first")
     return logs
-
-
-def approved(item: Item) -> list[str]:
-    """SHA-256 of the codes that were shown and allowed for a model that was sent."""
-    return list(item.about.get("approved") or [])
 
 
 def laws_to_identify() -> list[dict[str, str]]:

@@ -16,7 +16,7 @@ from typing import Any
 
 from stickslip.errors import InputError
 from stickslip.web.forks import POSSIBLE, Forked, Forks
-from stickslip.web.projects import NotThere
+from stickslip.web.projects import NotThere, Project
 
 Process = asyncio.subprocess.Process | Forked
 
@@ -42,6 +42,8 @@ class Job:
         Every line so far, each with its number and time.
     result : dict
         What came of it.
+    settled : bool
+        Whether `finish` has been called: what came of it is kept.
     """
 
     id: str
@@ -60,6 +62,7 @@ class Job:
     result: dict[str, Any] = field(default_factory=dict[str, Any])
     error: str = ""
     process: Process | None = None
+    settled: bool = False
     changed: asyncio.Event = field(default_factory=asyncio.Event)
     began: float = field(default_factory=time.time)
 
@@ -128,17 +131,18 @@ class Jobs:
         self._places = {"long": asyncio.Semaphore(most), "short": asyncio.Semaphore(2)}
 
     def start(
-        self, project: str, kind: str, title: str, request: Mapping[str, Any], *, item: str = "", short: bool = False,
-        limit: float = float("inf"), finish: Callable[[Job], None] | None = None, grace: float = GRACE,
-        meanwhile: Callable[[dict[str, Any]], None] | None = None,
+        self, project: Project, kind: str, title: str, request: Mapping[str, Any], *, item: str = "",
+        short: bool = False, limit: float = float("inf"), finish: Callable[[Job], None] | None = None,
+        grace: float = GRACE, meanwhile: Callable[[dict[str, Any]], None] | None = None,
     ) -> Job:  # fmt: skip
         """Begin a job, or let it wait for its turn.
 
         Parameters
         ----------
-        project, kind, title : str
+        project : Project
+        kind, title : str
         request : mapping
-            What the worker reads; ``task`` names what it does.
+            What the worker reads; ``task`` names what it does. The files that it opens are those of the project.
         item : str
             Identifier of what it makes.
         short : bool
@@ -161,7 +165,8 @@ class Jobs:
         if waiting >= WAITING:
             raise InputError(f"{waiting} jobs run or wait; let some of them end, or cancel them")
         name = f"job-{secrets.token_hex(6)}"
-        job = Job(name, project, kind, title, request, limit, finish, item, grace, meanwhile)
+        request = {**request, "project": str(project.folder)}
+        job = Job(name, project.id, kind, title, request, limit, finish, item, grace, meanwhile)
         self._jobs[job.id] = job
         self._forget()
         task = asyncio.create_task(self._run(job, self._places["short" if short else "long"]))
@@ -180,6 +185,10 @@ class Jobs:
         if job is None or job.project != project:
             raise NotThere("no such job; the server may have been started anew since")
         return job
+
+    def works_on(self, item: str) -> bool:
+        """Whether a job on an item runs or waits, or what came of it is not kept yet."""
+        return any(job.item == item and not job.settled for job in self._jobs.values())
 
     def of(self, project: str) -> list[Job]:
         """The jobs of a project, the oldest first."""
@@ -217,26 +226,33 @@ class Jobs:
 
     async def _run(self, job: Job, place: asyncio.Semaphore) -> None:
         async with place:
-            if job.ended:
-                return
-            job.state, job.began = "running", time.time()
-            try:
-                async with asyncio.timeout(None if job.limit == float("inf") else job.limit) as job.clock:
-                    await self._listen(job)
-            except TimeoutError:
-                job.error = f"this found no end in {job.limit:.0f} s and was ended"
-            except Exception as error:
-                job.error = f"its process could not be run ({error})"
-            finally:
-                if job.process is not None:
-                    await ended(job.process, job.grace)
+            if not job.ended:
+                await self._work(job)
         was_cancelled = job.ended
         if not was_cancelled:
             job.state = "failed" if job.error else "done"
-        if job.finish is not None:
-            job.finish(job)
+        try:
+            if job.finish is not None:
+                job.finish(job)
+        except (InputError, OSError) as error:  # a full disk, or a folder that is gone
+            job.state, job.error = "failed", f"what came of it cannot be kept ({error})"
+        job.settled = True
         if not was_cancelled:
             job.say(end=job.state, error=job.error, result=job.result)
+
+    async def _work(self, job: Job) -> None:
+        """Run the process of a job to its end."""
+        job.state, job.began = "running", time.time()
+        try:
+            async with asyncio.timeout(None if job.limit == float("inf") else job.limit) as job.clock:
+                await self._listen(job)
+        except TimeoutError:
+            job.error = f"timed out after {job.limit:.0f} s"
+        except Exception as error:
+            job.error = f"its process could not be run ({error})"
+        finally:
+            if job.process is not None:
+                await ended(job.process, job.grace)
 
     def prepare(self) -> None:
         """Start a process that has loaded what the next job needs, so that its imports are not waited for."""

@@ -39,11 +39,14 @@ def table(site: Site) -> Table:
         name = words(request.query_params.get("name", ""), "log")
         file = "upload" + suffix_of(name)
         item = project.add("logs", name=name, file=file, state="coming")
+        site.coming.add(item.id)
         try:
             size, digest = await received(request, item.folder / file, site.max_upload)
         except BaseException:
             shutil.rmtree(item.folder, ignore_errors=True)
             raise
+        finally:
+            site.coming.discard(item.id)
         item.update(size=size, sha256=digest, reading={}, state="reading")
         job = read_again(site, project, item)
         return JSONResponse({"id": item.id, "job": job.id}, 201)
@@ -70,10 +73,18 @@ def table(site: Site) -> Table:
         if not view:
             raise Refused(409, "this log has not been read yet")
         asked = request.query_params
-        places = channels_of(asked.get("channels", ""), len(view["channels"]))
+        channels = cast("Any", view.get("channels"))
+        if not isinstance(channels, list):
+            raise Refused(409, "the view of this log is damaged; read the log again")
+        places = channels_of(asked.get("channels", ""), len(cast("list[Any]", channels)))
         start, end = (number(asked.get(k, d), k) for k, d in (("from", "-1e300"), ("to", "1e300")))
         bins = int(min(max(number(asked.get("bins", "1000"), "bins"), 1.0), views.MOST_BINS))
-        content = await asyncio.to_thread(views.samples, item.folder / "view", view, places, start, end, bins)
+        try:
+            content = await asyncio.to_thread(
+                views.samples, item.folder / "view", view, places, start, end, bins
+            )
+        except (OSError, LookupError, TypeError, ValueError):
+            raise Refused(409, "the view of this log is damaged; read the log again") from None
         return Response(content, media_type="application/octet-stream")
 
     return {
@@ -85,12 +96,21 @@ def table(site: Site) -> Table:
 
 
 def read_again(site: Site, project: Project, item: Item) -> Job:
-    """Let a worker read a log as its description now says."""
+    """Let a worker read a log as its description now says.
+
+    Raises
+    ------
+    Refused
+        If its file is gone.
+    """
     about = item.about
-    size = int(about["size"])
+    file = item.folder / str(about.get("file", ""))
+    if not file.is_file():
+        raise Refused(409, f"the file of {about['name']} is gone; drop it again")
+    size = file.stat().st_size
     request = {
-        "task": "read", "folder": str(item.folder), "file": about["file"], "name": about["name"],
-        "reading": about["reading"], "memory": memory_for(size),
+        "task": "read", "folder": str(item.folder), "file": file.name, "name": about["name"],
+        "reading": reading_of(about.get("reading", {})), "memory": memory_for(size),
     }  # fmt: skip
 
     def finish(job: Job) -> None:
@@ -109,7 +129,7 @@ def read_again(site: Site, project: Project, item: Item) -> Job:
             item.update(state="looking", **shown)
 
     return site.jobs.start(
-        project.id, "read", f"Reading {about['name']}", request, item=item.id, short=True, limit=time_for(size),
+        project, "read", f"Reading {about['name']}", request, item=item.id, short=True, limit=time_for(size),
         finish=finish, meanwhile=meanwhile,
     )  # fmt: skip
 

@@ -7,10 +7,15 @@ PROJECT/models/model-ID/about.json, result.json, model.toml, report.html
 PROJECT/settings/setting-ID/about.json, result.json, recommended.toml
 PROJECT/studies/study-ID/about.json, result.json, study.toml, out/, report.html
 PROJECT/rigs/rig-ID/about.json, rig.toml, and what it names
+
+A project may come from somebody else, so its JSON states facts about its data and nothing else: which code may run is
+kept per user (`stickslip.approval`), whether a rig is real is read from its file when it is armed, whether a job runs
+is known from the jobs of this server, and no link leads out of it.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -23,11 +28,23 @@ from pathlib import Path
 from typing import Any, cast
 
 from stickslip.errors import InputError
+from stickslip.whole_files import prepared_folder, write_whole
 
 KINDS = {"logs": "log", "models": "model", "settings": "setting", "studies": "study", "rigs": "rig"}
 """What a project holds, and how the identifiers of each begin."""
 PROJECT_ID = re.compile(r"\d{4}-\d{2}-\d{2}-[0-9a-f]{8}")
 LONGEST_NAME = 120
+UPLOAD = re.compile(r"upload\.[a-z0-9]{1,8}|live\.stream")
+"""Names of the file of a log: ours, whatever the file was called."""
+KNOWN: Mapping[str, type] = {
+    "name": str, "state": str, "problem": str, "file": str, "model": str, "law": str, "verdict": str, "rig": str,
+    "sentence": str, "size": int, "rows": int, "readable": bool, "real": bool, "reading": dict, "view": dict,
+    "limits": dict, "asks": dict, "options": dict, "chosen": object, "columns": list, "findings": list, "facts": list,
+    "sent": list, "logs": list,
+}  # fmt: skip
+"""What each value of an item's JSON is; one of another kind is left out."""
+EMPTY: Mapping[str, Mapping[str, Any]] = {"rigs": {"facts": [], "sent": []}, "studies": {"sent": []}}
+"""What the page expects of each kind; a model without `sent` was identified here."""
 
 
 class NotThere(InputError):
@@ -42,18 +59,56 @@ def words(name: object, otherwise: str) -> str:
 
 def written_whole(path: Path, data: Mapping[str, Any]) -> None:
     """Write JSON so that a reader sees the file before or after, never half of it."""
-    draft = path.with_name(f"{path.name}.{secrets.token_hex(4)}.part")
-    draft.write_text(json.dumps(data, ensure_ascii=False, allow_nan=False), encoding="utf-8")
-    os.replace(draft, path)
+    write_whole(path, json.dumps(data, ensure_ascii=False, allow_nan=False), "--projects")
 
 
 def read_whole(path: Path) -> dict[str, Any]:
-    """What `written_whole` wrote; empty where there is nothing of the kind."""
+    """Return what `written_whole` wrote; empty if there is nothing of the kind. NaN becomes None."""
     try:
-        found: Any = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        if not path.is_file():  # a pipe would never end
+            return {}
+        # Half of a pair of surrogates, which JSON can spell, is no text that can be sent to the page.
+        text = path.read_text(encoding="utf-8")
+        found: Any = json.loads(text, parse_constant=lambda _: None)
+        if "\\ud" in text.lower():
+            found = json.loads(json.dumps(found, ensure_ascii=False).encode("utf-8", "replace"))
+    except (OSError, ValueError, RecursionError):
         return {}
     return cast("dict[str, Any]", found) if isinstance(found, dict) else {}
+
+
+def refuse_links(folder: Path, root: Path, shallow: bool = False) -> None:
+    """Refuse a folder with a link to a place outside of `root`.
+
+    Parameters
+    ----------
+    folder : Path
+    root : Path
+    shallow : bool
+        Whether what is inside of the folder is left alone.
+
+    Raises
+    ------
+    InputError
+        That names the link.
+    """
+    real = Path(os.path.realpath(root))
+    inside = (
+        ()
+        if shallow
+        else (Path(at, name) for at, *names in os.walk(folder) for part in names for name in part)
+    )
+    for place in (folder, *inside):
+        if (shallow or place.is_symlink()) and not Path(os.path.realpath(place)).is_relative_to(real):
+            raise InputError(
+                f"{place.relative_to(root)} is a link that leads out of {root.name}; it is not followed: put the file "
+                "itself there, or delete the link"
+            )
+
+
+def digest_of(code: str) -> str:
+    """Return the SHA-256 of code as it is shown, which is what `stickslip.approval` knows it by."""
+    return hashlib.sha256(code.encode()).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -69,8 +124,19 @@ class Item:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What is known of it."""
-        return read_whole(self.folder / "about.json")
+        """What is known of it, values of the wrong kind left out."""
+        found = read_whole(self.folder / "about.json")
+        kept = {k: v for k, v in found.items() if k not in KNOWN or isinstance(v, KNOWN[k])}
+        if not UPLOAD.fullmatch(kept.get("file", "upload.dat")):
+            del kept["file"]
+        asks = cast("dict[str, Any]", kept.pop("asks", {}))
+        name, code = asks.get("name"), asks.get("text")
+        if isinstance(name, str) and isinstance(code, str):
+            kept["asks"] = {"name": words(name, "code"), "text": code, "sha256": digest_of(code)}
+        elif kept.get("state") == "asks":
+            kept |= {"state": "failed", "problem": "its code is not kept; delete it and drop its files again"}
+        empty = EMPTY.get(self.folder.parent.name, {})
+        return {**empty, **kept, "id": self.id, "name": words(kept.get("name", ""), self.id)}
 
     def update(self, **changes: Any) -> dict[str, Any]:
         """Change what is known of it. Returns all of it."""
@@ -98,7 +164,7 @@ class Project:
     @property
     def name(self) -> str:
         """As people gave it."""
-        return str(read_whole(self.folder / "project.json").get("name", self.id))
+        return words(read_whole(self.folder / "project.json").get("name", ""), self.id)
 
     def add(self, kind: str, **about: Any) -> Item:
         """Make room for a log, model or setting."""
@@ -114,11 +180,14 @@ class Project:
         Raises
         ------
         NotThere
+        InputError
+            If a link in it leads out of the project.
         """
         word = KINDS.get(kind, "")
         if word and isinstance(identifier, str) and re.fullmatch(rf"{word}-[0-9a-f]{{8}}", identifier):
             folder = self.folder / kind / identifier
             if folder.is_dir():
+                refuse_links(folder, self.folder)
                 return Item(folder)
         raise NotThere(f"no such {word or 'thing'} in this project; it may have been deleted")
 
@@ -144,11 +213,6 @@ class Project:
         """
         shutil.rmtree(self.item(kind, identifier).folder)
 
-    def summary(self) -> dict[str, Any]:
-        """Name and what it holds, as the page lists it."""
-        held = {kind: [item.about for item in self.items(kind)] for kind in KINDS}
-        return {"id": self.id, "name": self.name, "folder": str(self.folder), **held}
-
 
 class Projects:
     """The folder of projects.
@@ -166,15 +230,7 @@ class Projects:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            probe = folder / ".stickslip"
-            probe.write_text("")
-            probe.unlink()
-        except OSError as error:
-            raise InputError(
-                f"cannot write {folder} ({error.strerror or error}); choose another place with --projects"
-            ) from None
+        prepared_folder(folder, "--projects")
 
     def add(self, name: object = "") -> Project:
         """A new project."""
@@ -190,10 +246,15 @@ class Projects:
         Raises
         ------
         NotThere
+        InputError
+            If a link in its place leads elsewhere.
         """
         if isinstance(identifier, str) and PROJECT_ID.fullmatch(identifier):
             folder = self.folder / identifier
             if (folder / "project.json").is_file():
+                refuse_links(folder, self.folder, shallow=True)
+                for name in (*KINDS, "project.json"):
+                    refuse_links(folder / name, folder, shallow=True)
                 return Project(folder)
         raise NotThere("no such project; it may have been moved or deleted")
 

@@ -32,7 +32,7 @@ def projects(site: Site) -> Table:
     async def one(request: Request) -> Response:
         project = site.project(request)
         running = [job.about() for job in site.jobs.of(project.id)]
-        return JSONResponse({**project.summary(), "jobs": running})
+        return JSONResponse({**site.summary(project), "jobs": running})
 
     return {
         ("GET", "/projects"): all_projects, ("POST", "/projects"): add, ("GET", "/projects/{project}"): one,
@@ -44,7 +44,7 @@ def items(site: Site) -> Table:
 
     async def about(request: Request) -> Response:
         item = site.item(request, known_kind(request))
-        return JSONResponse({**item.about, "result": item.result})
+        return JSONResponse({**site.about(site.project(request), item), "result": item.result})
 
     async def removed(request: Request) -> Response:
         kind = known_kind(request)

@@ -1,7 +1,7 @@
 """What a worker does with rigs: a look at a file that was sent, the plan of a procedure, and its run.
 
 A rig is a machine of the library, which is simulated, or the ``rig.toml`` of an item of the project; the code that such
-a file names runs if it is among what was approved for that item.
+a file names runs if this user has approved it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
-from stickslip.approval import allow_code
 from stickslip.errors import InputError
 from stickslip.rigs.rig import LIMIT_UNITS, Limits, Rig
 from stickslip.web.worker import Said
@@ -110,14 +109,22 @@ def rig_plan(request: Request, say: Said) -> dict[str, Any]:
     """What a procedure will do on a rig: nothing moves."""
     from stickslip.rigs.procedures.base import planned
 
-    with allow_code(request["approved"]):
-        chosen, rig = procedure_on(request)
-        plan = planned(chosen, rig)
-        plan.within(rig)
+    chosen, rig = procedure_on(request)
+    plan = planned(chosen, rig)
+    plan.within(rig)
     return {
         "text": list(plan.text), "duration": plan.duration, "pauses": plan.pauses, "travel": plan.travel,
-        "speed": plan.speed, "torque": plan.torque, "limits": rig.limits.plain(), "rig": rig.name,
+        "speed": plan.speed, "torque": plan.torque, "limits": rig.limits.plain(), "rig": rig.name, **facts_of(request),
     }  # fmt: skip
+
+
+def facts_of(request: Request) -> dict[str, Any]:
+    """Return the facts in the file of a rig, and the sentence to confirm; both empty for a machine of the library."""
+    file = str(request["rig"])
+    if not file:
+        return {"facts": [], "sentence": ""}
+    said = described(Path(file))
+    return {key: said[key] for key in ("facts", "sentence")}
 
 
 def rig_run(request: Request, say: Said) -> dict[str, Any]:
@@ -125,11 +132,12 @@ def rig_run(request: Request, say: Said) -> dict[str, Any]:
     from stickslip.rigs.procedures.base import perform
 
     folder = Path(request["folder"])
-    with allow_code(request["approved"]):
-        chosen, rig = procedure_on(request)
-        say({"tell": "making ready: nothing moves yet"})
-        stream = folder / "live.stream"
-        done = perform(chosen, rig, path=stream, progress=lambda label: say({"tell": label}), realtime=True)
+    if facts_of(request)["sentence"] != request["understood"]:
+        raise InputError("the file of the rig was changed since its plan was made; make the plan again")
+    chosen, rig = procedure_on(request)
+    say({"tell": "making ready: nothing moves yet"})
+    stream = folder / "live.stream"
+    done = perform(chosen, rig, path=stream, progress=lambda label: say({"tell": label}), realtime=True)
     done.record.save(folder / "upload.npz")
     return {"passed": done.passed, "checks": [asdict(c) for c in done.checks]}
 

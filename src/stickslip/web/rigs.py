@@ -19,7 +19,7 @@ from stickslip.web.asking import Refused, Table, body, text
 from stickslip.web.jobs import Job
 from stickslip.web.logs import read_again
 from stickslip.web.projects import Item, Project
-from stickslip.web.sent import MAIN
+from stickslip.web.sent import LOOK, MAIN, ask_again, started
 from stickslip.web.site import Site
 
 PATIENCE = 4.0
@@ -31,6 +31,8 @@ KILLED = 9
 """The signal that ends a process which did not end when it was asked to"""
 GRACE = 10.0
 """s beside the rig's own time for its ramp, after which a run that was asked to end is ended"""
+VIRTUAL: dict[str, Any] = {"sentence": "", "real": False, "limits": dict[str, float]()}
+"""What is known of a machine of the library"""
 MOST = 25
 """Rows of a frame, of each stretch one"""
 
@@ -87,10 +89,11 @@ def beginning(site: Site, watch: Watch) -> Table:
 
     async def plan(request: Request) -> Response:
         project = site.project(request)
-        asked = asked_of(project, await body(request))[0]
+        asked, rig = asked_of(project, await body(request))
         job = site.jobs.start(
-            project.id, "plan", "Planning", {"task": "rig_plan", **asked}, short=True, limit=120.0
-        )
+            project, "plan", "Planning", {"task": "rig_plan", **asked}, short=True, limit=120.0,
+            finish=lambda job: ask_again(site, project, [rig], job),
+        )  # fmt: skip
         return JSONResponse({"job": job.id}, 201)
 
     async def start(request: Request) -> Response:
@@ -98,17 +101,18 @@ def beginning(site: Site, watch: Watch) -> Table:
         if data.get("armed") is not True:
             raise Refused(409, "the rig is not armed: read its plan, then arm it")
         asked, rig = asked_of(project, data)
-        said = rig.about if rig else {}
-        if said.get("sentence") and data.get("understood") != said["sentence"]:
+        said = await facts_now(site, project, rig) if rig else VIRTUAL
+        if said["sentence"] and data.get("understood") != said["sentence"]:
             raise Refused(409, f"{said['sentence']}: this has to be confirmed before the rig is armed")
-        refuse_second(site, project, real=bool(said.get("real")))
-        on = said["name"] if rig else asked["machine"]
+        refuse_second(site, project, real=said["real"])
+        on = rig.about["name"] if rig else asked["machine"]
         name = project.free_name("logs", f"{asked['procedure']} on {on}")
         item = project.add("logs", name=name, file="live.stream", state="coming", reading={}, size=0)
-        work = {"task": "rig_run", "folder": str(item.folder), "real": bool(said.get("real")), **asked}
+        confirmed = {"real": said["real"], "understood": said["sentence"]}
+        work = {"task": "rig_run", "folder": str(item.folder), **confirmed, **asked}
         job = site.jobs.start(
-            project.id, "rig", name, work, item=item.id, short=True,
-            grace=GRACE + said.get("limits", {}).get("stop_time", 0.0),
+            project, "rig", name, work, item=item.id, short=True,
+            grace=GRACE + said["limits"].get("stop_time", 0.0),
             finish=lambda job: kept(site, project, item, job),
         )  # fmt: skip
         watch.begin(job)
@@ -169,6 +173,24 @@ def described() -> dict[str, Any]:
     return {"machines": machines, "procedures": procedures}
 
 
+async def facts_now(site: Site, project: Project, rig: Item) -> dict[str, Any]:
+    """Return what the file of a rig states at this moment, read by a worker, whatever the project keeps of it.
+
+    Raises
+    ------
+    Refused
+        If it is none that can be run.
+    """
+    job = started(site, project, rig, LOOK, f"Looking at {rig.about['name']}", short=True)
+    async for _ in job.lines():
+        pass
+    if job.state != "done" or job.result.get("state") != "ready":
+        raise Refused(
+            409, job.error or "this rig cannot be run as it is; open it in the project, which says why"
+        )
+    return job.result
+
+
 def refuse_second(site: Site, project: Project, real: bool) -> None:
     """One rig at a time in a project, and one real one in all of them: two might be the same machine.
 
@@ -216,9 +238,7 @@ def asked_of(project: Project, data: dict[str, Any]) -> tuple[dict[str, Any], It
     if odd := [name for name in ("controller", "model") if out.get(name)]:
         raise Refused(400, f"{odd[0]} names a file, which the page does not take; use the command line")
     file = str(rig.folder / MAIN["rigs"]) if rig else ""
-    approved: list[str] = rig.about["approved"] if rig else []
-    asked = {"machine": machine, "rig": file, "approved": approved, "procedure": procedure, "options": out}
-    return asked, rig
+    return {"machine": machine, "rig": file, "procedure": procedure, "options": out}, rig
 
 
 def rig_of(project: Project, data: dict[str, Any]) -> Item | None:

@@ -1,26 +1,29 @@
 """Addresses of models, studies and rigs from elsewhere: kept, looked at, run once their code has been seen and allowed.
 
-A TOML file may name Python code, and whoever runs it gives it all that he can do himself. So it is loaded with only
-those codes allowed whose SHA-256 somebody has confirmed for this very item, after its text was shown; what other
-projects, other items or the command line have approved counts for nothing here.
+A TOML file may name Python code, and whoever runs it gives it all that he can do himself. So it runs if this user has
+approved the same bytes (`stickslip.approval`), in the page after its text was shown. Nothing that a project says of
+itself counts: what is approved is the text that was shown, known by its SHA-256, whatever the project calls it.
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any, cast
 
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
+from stickslip import approval
+from stickslip.errors import CodeRefused
 from stickslip.verbs.kinds import WORDS, kind_of_toml
 from stickslip.web.asking import Refused, Table, body, text
 from stickslip.web.jobs import Job
 from stickslip.web.projects import Item, Project, words
 from stickslip.web.site import Site
+from stickslip.whole_files import write_whole
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_. -]{0,79}\.(toml|py|csv)", re.IGNORECASE)
 """Names that are taken as they are, since the TOML file says them; none of them leaves a folder."""
@@ -38,18 +41,8 @@ def table(site: Site) -> Table:
     """Handlers by method and path."""
 
     def begin(project: Project, item: Item, task: str, title: str) -> Response:
-        about = item.update(state="looking" if task == LOOK else "running", problem="")
-        kind = item.folder.parent.name
-        request = {
-            "task": task,
-            "folder": str(item.folder),
-            "file": MAIN[kind],
-            "approved": about["approved"],
-        }
-        job = site.jobs.start(
-            project.id, task, title, request, item=item.id, finish=lambda job: told(item, job)
-        )
-        return JSONResponse({"id": item.id, "kind": kind, "job": job.id}, 201)
+        job = started(site, project, item, task, title)
+        return JSONResponse({"id": item.id, "kind": item.folder.parent.name, "job": job.id}, 201)
 
     async def add(request: Request) -> Response:
         project = site.project(request)
@@ -64,18 +57,20 @@ def table(site: Site) -> Table:
         if machine:
             stored = with_rig(main, stored)
         name = words(main.removesuffix(".toml"), "study")
-        item = project.add(kind, name=name, sent=sorted(files), approved=[], state="looking")
+        item = project.add(kind, name=name, sent=sorted(files), state="looking")
         for name, content in stored.items():
-            (item.folder / name).write_text(content, encoding="utf-8", newline="")
+            write_whole(item.folder / name, content, "--projects")
         return begin(project, item, LOOK, f"Looking at {main}")
 
     async def approve(request: Request) -> Response:
         project, item = site.project(request), site.item(request, request.path_params["kind"])
         about = item.about
-        shown: dict[str, Any] = about.get("asks") or {}
-        if about.get("state") != "asks" or text(await body(request), "sha256") != shown["sha256"]:
+        shown: dict[str, Any] = about.get("asks", {})
+        digest = text(await body(request), "sha256")
+        if about.get("state") != "asks" or digest != shown["sha256"]:
             raise Refused(409, "this is not the code that was shown; open the page again and read it")
-        item.update(approved=[*about["approved"], shown["sha256"]], asks=None)
+        approval.approve(str(item.folder / shown["name"]), digest)
+        item.update(asks=None)
         return begin(project, item, LOOK, f"Running {shown['name']}")
 
     async def run(request: Request) -> Response:
@@ -91,6 +86,27 @@ def table(site: Site) -> Table:
         ("POST", "/projects/{project}/{kind}/{item}/approval"): approve,
         ("POST", "/projects/{project}/studies/{item}/run"): run,
     }
+
+
+def started(site: Site, project: Project, item: Item, task: str, title: str, short: bool = False) -> Job:
+    """Start a job on an item that was sent; the item keeps what came of it."""
+    item.update(state="looking" if task == LOOK else "running", problem="")
+    request = {"task": task, "folder": str(item.folder), "file": MAIN[item.folder.parent.name]}
+
+    def finish(job: Job) -> None:
+        told(item, job)
+        if task != LOOK:
+            ask_again(site, project, [item], job)
+
+    return site.jobs.start(project, task, title, request, item=item.id, short=short, finish=finish)
+
+
+def ask_again(site: Site, project: Project, items: Sequence[Item | None], job: Job) -> None:
+    """Look at the items from which a job was refused code, so that the page shows the code and asks."""
+    if job.result.get("kind") == CodeRefused.__name__:
+        for item in items:
+            if item is not None and (item.folder / MAIN[item.folder.parent.name]).is_file():
+                started(site, project, item, LOOK, f"Looking at {item.about['name']}")
 
 
 def told(item: Item, job: Job) -> None:

@@ -1,14 +1,12 @@
-"""What a worker does with models, studies and rigs from elsewhere; their code runs if it is among what was approved."""
+"""What a worker does with models, studies and rigs from elsewhere; their code runs if this user has approved it."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from stickslip.approval import allow_code
-from stickslip.errors import CodeRefused
+from stickslip.errors import CodeRefused, InputError
 from stickslip.web import rig_tasks
 from stickslip.web.projects import Item, written_whole
 from stickslip.web.worker import Said, plain
@@ -24,16 +22,18 @@ def look(request: Request, say: Said) -> dict[str, Any]:
     path = item.folder / str(request["file"])
     say({"tell": "reading"})
     try:
-        with allow_code(request["approved"]):
-            if path.name == rig_tasks.MAIN:
-                return rig_tasks.described(path)
-            return model_of(item, path) if path.name == "model.toml" else study_of(path)
+        if path.name == rig_tasks.MAIN:
+            return rig_tasks.described(path)
+        return model_of(item, path) if path.name == "model.toml" else study_of(path)
     except CodeRefused as refused:
-        shown = {
-            "name": Path(refused.path).name, "text": refused.code.decode("utf-8", "replace"),
-            "sha256": hashlib.sha256(refused.code).hexdigest(),
-        }  # fmt: skip
-        return {"state": "asks", "asks": shown}
+        name = Path(refused.path).name
+        try:
+            text = refused.code.decode("utf-8")
+        except UnicodeDecodeError:
+            raise InputError(
+                f"{name} is not UTF-8 text, so its code cannot be shown as it would run; save it as UTF-8"
+            ) from None
+        return {"state": "asks", "asks": {"name": name, "text": text}}
 
 
 def model_of(item: Item, path: Path) -> dict[str, Any]:
@@ -41,6 +41,8 @@ def model_of(item: Item, path: Path) -> dict[str, Any]:
     from stickslip.identify.identified_file import read_identified
 
     found = read_identified(path)
+    if (item.folder / "result.json").is_file():  # it was identified in the project that this one is a copy of
+        return {"state": "done"}
     law = found.model.law
     units = {f.name: found.unit(f.par.unit) for f in law.fields}
     meanings = {f.name: f.par.meaning for f in law.fields}
@@ -78,8 +80,7 @@ def run_sent(request: Request, say: Said) -> dict[str, Any]:
 
     item = Item(Path(request["folder"]))
     path = item.folder / str(request["file"])
-    with allow_code(request["approved"]):
-        result = simulation(path) if kind_of(path) == "simulation" else study(path, item, say)
+    result = simulation(path) if kind_of(path) == "simulation" else study(path, item, say)
     written_whole(item.folder / "result.json", plain(result))
     return {"state": "done"}
 

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from starlette.requests import Request
 
+from stickslip.errors import InputError
 from stickslip.web.bench import Bench
 from stickslip.web.jobs import Jobs
-from stickslip.web.projects import Item, Project, Projects
+from stickslip.web.projects import KINDS, Item, Project, Projects, refuse_links
+
+BUSY = ("coming", "reading", "looking", "running")
+"""States of an item that a job, or an upload, of this server ends."""
+STOPPED = "the server ended before this was finished; "
+REMEDY = {
+    "logs": "read it again under “Columns and units”, or delete it", "studies": "run it again",
+    "models": "delete it and start again", "settings": "delete it and start again",
+    "rigs": "delete it and drop its files again",
+}  # fmt: skip
+"""What to do about an item of each kind whose job is gone."""
 
 
 @dataclass(frozen=True)
@@ -22,12 +34,15 @@ class Site:
     max_upload : int
         Bytes.
     bench : Bench
+    coming : set of str
+        Identifiers of the logs that are being uploaded.
     """
 
     projects: Projects
     jobs: Jobs
     max_upload: int
     bench: Bench
+    coming: set[str] = field(default_factory=set[str])
 
     def project(self, request: Request) -> Project:
         """The project that the path names.
@@ -46,6 +61,31 @@ class Site:
         NotThere
         """
         return self.project(request).item(kind, request.path_params["item"])
+
+    def about(self, project: Project, item: Item) -> dict[str, Any]:
+        """Return what the page shows of an item: what is known of it, and whether it is what it claims to be.
+
+        A project may have been moved here, or its server killed, while a job ran: without the job it has failed.
+        """
+        about, kind = item.about, item.folder.parent.name
+        problem = ""
+        try:
+            refuse_links(item.folder, project.folder)
+        except InputError as error:
+            problem = str(error)
+        if about.get("state") in BUSY and item.id not in self.coming and not self.jobs.works_on(item.id):
+            problem = problem or STOPPED + REMEDY[kind]
+        if not problem:
+            return about
+        failed: dict[str, Any] = {"state": "failed"}
+        if kind == "logs":
+            failed = {"state": "unread", "readable": False, "columns": []}
+        return {**about, **failed, "problem": problem}
+
+    def summary(self, project: Project) -> dict[str, Any]:
+        """Return the name of a project and what it holds, as the page lists it."""
+        held = {kind: [self.about(project, item) for item in project.items(kind)] for kind in KINDS}
+        return {"id": project.id, "name": project.name, "folder": str(project.folder), **held}
 
     async def close(self) -> None:
         """End what runs."""

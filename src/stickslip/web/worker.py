@@ -14,9 +14,11 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TextIO
 
 from stickslip.capacity import limit_memory
+from stickslip.config import confined_to
 from stickslip.errors import StickslipError
 from stickslip.in_python import with_options
 
@@ -69,7 +71,8 @@ def outcome(request: dict[str, Any], say: Said) -> dict[str, Any]:
     """The last line."""
     try:
         tasks = importlib.import_module("stickslip.web.tasks")
-        with with_options():  # which the page has words of its own for
+        # Options are what the page has words of its own for.
+        with with_options(), confined_to(Path(request["project"])):
             return {"done": tasks.TASKS[request["task"]](request, say)}
     except StickslipError as error:
         words = importlib.import_module("stickslip.web.wording").in_the_page(str(error))

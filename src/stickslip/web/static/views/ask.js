@@ -1,4 +1,4 @@
-// Code that came with a model, study or rig: it is shown, and runs only after an explicit step, for this item alone.
+// Code that came with a model, study or rig: it is shown, and runs only after an explicit step.
 
 import { post, remove } from "../api.js";
 import { complaint, fill, h } from "../dom.js";
@@ -36,7 +36,7 @@ export function ask(kind, item) {
     h("p", {}, h("strong", {}, name), ` (${text.split("\n").length} lines) came with it. Nothing of it has run yet. Code that runs can do all that you can on this machine: read and change your files, and reach the network. `
       + "Read it, or ask whoever sent it, before you let it."),
     h("pre", { tabindex: 0, "aria-label": `Code of ${name}` }, visible(text)),
-    h("p", { class: "hint" }, "SHA-256 ", h("code", {}, sha256), `. What you allow is this code, for this item of this project, and nothing else.`),
+    h("p", { class: "hint" }, "SHA-256 ", h("code", {}, sha256), ". You approve this code until it changes, wherever a file names it, also on the command line."),
     h("p", { class: "row tick" }, read, h("label", { for: "code-read", htmlFor: "code-read" }, "I have read it and trust whoever sent it")),
     h("div", { class: "row" }, refuse, allow), state);
 }

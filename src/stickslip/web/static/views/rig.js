@@ -13,16 +13,17 @@ export async function show(box, id) {
   const chosen = sent.find((r) => r.id === id);
   if (id && chosen?.state !== "ready") return unready(box, chosen);
   const { machines, procedures } = await get("/rigs");
-  const rigs = [...machines.map((m) => ({ key: m.name, what: `virtual machine, ${m.title}`, name: m.name, asked: { machine: m.name }, facts: [], sentence: "" })),
-    ...sent.filter((r) => r.state === "ready").map((r) => ({ key: r.id, what: r.facts.slice(0, -1).join(", "), name: r.name, asked: { rig: r.id }, facts: r.facts, sentence: r.sentence }))];
+  const rigs = [...machines.map((m) => ({ key: m.name, what: `virtual machine, ${m.title}`, name: m.name, asked: { machine: m.name }, facts: [] })),
+    ...sent.filter((r) => r.state === "ready").map((r) => ({ key: r.id, what: r.facts.slice(0, -1).join(", "), name: r.name, asked: { rig: r.id }, facts: r.facts }))];
   const plan = h("div");
   const live = h("section", { class: "live", "aria-label": "Running rig" });
-  const form = choice(rigs, procedures, id, plan, async (rig, what) => {
+  const form = choice(rigs, procedures, id, plan, async (what) => {
     try {
       const { job } = await post(here("/rig/plan"), what);
       const line = await run(job, "Planning");
       if (line.end !== "done") throw new Error(line.error || line.end);
-      fill(plan, planned(line.result, rig.sentence, () => { fill(plan); one = begin(live, { ...what, understood: rig.sentence }); }));
+      // The sentence is the file's own now, not what the project keeps of it.
+      fill(plan, planned(line.result, () => { fill(plan); one = begin(live, { ...what, understood: line.result.sentence }); }));
       plan.querySelector("input")?.focus();
     } catch (error) {
       fill(plan, complaint(error));
@@ -38,7 +39,7 @@ export async function show(box, id) {
 function choice(rigs, procedures, id, plan, makePlan) {
   const options = h("div", { class: "grid" });
   const facts = h("ul", { class: "facts", "aria-label": "The rig" });
-  const form = h("form", { onsubmit: (event) => { event.preventDefault(); const { rig, what } = asked(); makePlan(rig, what); } },
+  const form = h("form", { onsubmit: (event) => { event.preventDefault(); makePlan(asked()); } },
     h("div", { class: "grid broad" }, field("Rig", "rig", { options: rigs.map((r) => [r.key, `${r.name}: ${r.what}`]), value: id }),
       field("Procedure", "procedure", { options: procedures.map((p) => [p.name, `${p.name}: ${p.title}`]), value: "stickslip" })), facts,
     h("details", {}, h("summary", {}, "Options of the procedure"), options), h("button", { type: "submit", class: "main" }, "Show the plan"));
@@ -51,7 +52,7 @@ function choice(rigs, procedures, id, plan, makePlan) {
   const asked = () => {
     const given = values(form);
     const texts = Object.fromEntries(Object.entries(given).filter(([k]) => k.startsWith("o-")).map(([k, v]) => [k.slice(2), String(v)]));
-    return { rig: rigOf(), what: { ...rigOf().asked, procedure: given.procedure, options: texts } };
+    return { ...rigOf().asked, procedure: given.procedure, options: texts };
   };
   form.addEventListener("change", () => fill(plan));
   form.elements.procedure.addEventListener("change", describe);

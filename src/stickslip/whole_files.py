@@ -1,0 +1,108 @@
+"""Files that are written whole: a draft with a name of its own replaces the file when it is complete.
+
+Whoever reads the file, and whoever looks after a full disk or a killed process, finds the old file or the new one,
+never a part. The draft's name is random, so it never collides with a file of the user.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from stickslip.errors import InputError, unwritable
+
+DRAFTS = ".stickslip-*.part"
+"""Pattern of the names of drafts, to remove those that a killed process left behind."""
+
+
+@contextmanager
+def draft_of(target: Path, option: str = "--out") -> Generator[Path]:
+    """Yield an empty draft in the folder of `target`; it replaces `target` at the end, or is removed after an error.
+
+    A symbolic link stays one: the file that it points to is replaced.
+
+    Parameters
+    ----------
+    target : Path
+    option : str
+        The option with which the user chooses another place.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written, or `target` is a folder, a pipe or a device.
+    """
+    refuse_nul(target, option)
+    try:
+        final = Path(os.path.realpath(target))
+        exists = final.exists()
+        if exists and not final.is_file():
+            what = "a folder" if final.is_dir() else "a pipe or device"
+            raise InputError(f"{target} is {what}, not a file; choose another place with {option}")
+        if exists and not os.access(final, os.W_OK):
+            raise PermissionError(0, "it is read-only")
+        draft = final.with_name(DRAFTS.replace("*", secrets.token_hex(8)))
+        os.close(os.open(draft, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        try:
+            yield draft
+            if exists:
+                shutil.copymode(final, draft)
+            os.replace(draft, final)
+        except BaseException:
+            with suppress(OSError):
+                draft.unlink()
+            raise
+    except OSError as error:
+        raise unwritable(target, error, option) from None
+
+
+def write_whole(target: Path, content: str | bytes, option: str = "--out") -> Path:
+    """Write text (UTF-8, line ends as they are) or bytes to a file, as `draft_of` does; return `target`.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        data = content if isinstance(content, bytes) else content.encode()
+    except UnicodeEncodeError as error:
+        odd = error.object[error.start : error.end]
+        raise InputError(
+            f"cannot write {target}: {odd!r} in its text is not Unicode; correct that text"
+        ) from None
+    with draft_of(target, option) as draft:
+        draft.write_bytes(data)
+    return target
+
+
+def prepared_folder(folder: Path, option: str = "--out") -> Path:
+    """Make the folder and check that files can be made in it, before anything is computed; return it.
+
+    Raises
+    ------
+    InputError
+    """
+    refuse_nul(folder, option)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / DRAFTS.replace("*", secrets.token_hex(8))
+        os.close(os.open(probe, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+        probe.unlink()
+    except OSError as error:
+        raise unwritable(folder, error, option) from None
+    return folder
+
+
+def refuse_nul(path: Path, option: str = "--out") -> None:
+    """Refuse a path with a NUL character, which no file system takes.
+
+    Raises
+    ------
+    InputError
+    """
+    if "\0" in str(path):
+        raise InputError(f"{str(path)!r} contains a NUL character; choose another place with {option}")
