@@ -24,7 +24,7 @@ from typing import Any
 from stickslip.export import c99
 from stickslip.export._analysis import fields_read
 from stickslip.export._c import safe
-from stickslip.export._text import ascii_only, render
+from stickslip.export._text import Code, render
 from stickslip.export.job import Job
 from stickslip.spec import Field, Surroundings
 
@@ -93,7 +93,7 @@ class Variable:
         """Attributes ``min`` and ``max``; the standard's bounds include their ends."""
         low = 0.0 if self.positive else self.lower
         bounds = {"min": low, "max": self.upper}
-        return "".join(f' {name}="{value!r}"' for name, value in bounds.items() if value is not None)
+        return Code("".join(f' {name}="{value!r}"' for name, value in bounds.items() if value is not None))
 
     @property
     def bounds(self) -> str:
@@ -199,7 +199,7 @@ def contents_of(job: Job) -> Contents:
     """A law and its C."""
     x, law = job.name, job.model.law
     return Contents(
-        x, ascii_only(law.title),
+        x, law.title,
         {name: str(text) for name, text in c99.write(job).files.items() if name in (f"{x}.c", f"{x}.h")},
         wholes_of(law.fields, job.model.parameters._asdict()),
         ", ".join(f.name for f in law.fields if f.par.shares),
@@ -246,7 +246,7 @@ def archive(
     kind, x, c_files = VERSIONS[fmi], contents.name, dict(contents.sources)
     sources = [f"{x}.c", f"{x}_{kind}.c"]
     units = [
-        {"name": u, "base": BASE_UNITS.get(u)} for u in sorted({"s", *(v.unit for v in variables)} - {""})
+        {"name": u, "base": Code(BASE_UNITS.get(u, ""))} for u in sorted({"s", *(v.unit for v in variables)} - {""})
     ]
     values: dict[str, Any] = {
         "x": x, "fmi": fmi, "core": core, "variables": variables, "about": about, "sources": sources, "units": units,

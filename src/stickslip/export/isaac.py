@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from stickslip.export._text import render
+from stickslip.export._text import Code, render
 from stickslip.export.job import Export, Job
 from stickslip.export.nearest import COULOMB, STATIC, carried
 from stickslip.export.target import Setting, Target, settings_of
@@ -25,8 +25,8 @@ def write(job: Job) -> Export:
     settings = settings_of(TARGET, job.settings)
     notes = (NOTE, *found.notes)
     values: dict[str, Any] = {
-        "x": job.name, "law": job.model.law, "group": json.dumps(settings["group"]),
-        "joints": json.dumps(settings["joints"]), "friction": repr(p.get("fs", p["fc"])), "dynamic": repr(p["fc"]),
+        "x": job.name, "law": job.model.law, "group": Code(json.dumps(settings["group"], ensure_ascii=False)),
+        "joints": Code(json.dumps(settings["joints"], ensure_ascii=False)), "friction": repr(p.get("fs", p["fc"])), "dynamic": repr(p["fc"]),
         "viscous": repr(p["sigma2"]), "notes": notes,
     }  # fmt: skip
     files = {

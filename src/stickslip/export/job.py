@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from stickslip.errors import InputError
+from stickslip.export._text import folded
 from stickslip.model import Model
 
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")
@@ -69,11 +70,14 @@ class Export:
     ----------
     files : mapping of str to str or bytes
     notes : tuple of str
-        What the target does not hold, and by how much it differs.
+        What the target does not hold, and by how much it differs; each is one printable line.
     """
 
     files: Mapping[str, str | bytes]
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "notes", tuple(map(folded, self.notes)))
 
 
 @dataclass(frozen=True)

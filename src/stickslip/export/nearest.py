@@ -21,6 +21,7 @@ from stickslip.binding import NEGATIVE
 from stickslip.errors import ParameterError
 from stickslip.export._analysis import fields_read
 from stickslip.export._sliding import Curve
+from stickslip.export._text import folded
 from stickslip.export.job import CannotCarry, Job
 from stickslip.model import Model
 from stickslip.spec import Bristle, Law, Mode
@@ -311,7 +312,7 @@ def losses(curve: Curve, form: Form) -> list[str]:
         and law.state_fields
         and not ("bristle" in form.keeps and bristle_of(curve))
     ):
-        bends = [f.par.meaning for f in law.state_fields if not isinstance(f.par, Mode)]
+        bends = [folded(f.par.meaning) for f in law.state_fields if not isinstance(f.par, Mode)]
         memory = "; non-local memory" if law.non_local_memory else ""
         out.append(f"pre-sliding and hysteresis ({', '.join(bends[:3]) or 'its states'}{memory})")
     if "slope" not in form.keeps and curve.slowest > 0.0:

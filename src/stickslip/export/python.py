@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import render, sources
+from stickslip.export._text import Code, render, sources
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
@@ -39,7 +39,7 @@ def write(job: Job) -> Export:
         parameters=[*assigned(law.fields, p._asdict())],
         states=[*cleared(law.state_fields)],
         around=[f"{name}={value!r}" for name, value in Surroundings()._asdict().items()],
-        functions=[ast.unparse(tree) for tree in trees.values()],
+        functions=[Code(ast.unparse(tree)) for tree in trees.values()],
         steady=law.steady is not None,
     )
     files = {f"{job.name}.py": text, "golden.csv": as_csv(golden_around(job.model, PACE))}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -10,7 +9,7 @@ from stickslip.export._hoist import hoisted
 from stickslip.export._st import Names, functions, number
 from stickslip.export._st_names import RESERVED, named_in_st, renamed
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import ascii_only, render, sources, summary
+from stickslip.export._text import Code, in_lines, render, sources, summary, text_in
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Export, Job, counts_in
 from stickslip.export.target import Target
@@ -59,9 +58,9 @@ def write(job: Job) -> Export:
     values: dict[str, Any] = {
         "x": x,
         "file": f"{job.name}.st",
-        "title": ascii_only(law.title),
-        "equation": textwrap.wrap(ascii_only(law.equation), 110, break_long_words=False),
-        "source": ascii_only(sources(law)),
+        "title": law.title,
+        "equation": in_lines(law.equation),
+        "source": sources(law),
         "parameters": [*declared(law.fields, p._asdict(), counts, word)],
         "states": [*declared(law.state_fields, {}, counts, word)],
         "around": around,
@@ -101,7 +100,8 @@ def declared(
         if values:
             value = values[f.name]
             start = f" := [{', '.join(map(number, value))}]" if f.per_element else f" := {number(value)}"
-        yield f"{word[f.name]} : {kind}{start}; (* {ascii_only(f'{f.par.meaning}, {f.par.unit}')} *)"
+        meaning = text_in("st", f"{f.par.meaning}, {f.par.unit}")
+        yield Code(f"{word[f.name]} : {kind}{start}; (* {meaning} *)")
     if not fields:
         yield "none : LREAL;"
 
