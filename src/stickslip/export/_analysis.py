@@ -11,6 +11,8 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from stickslip.errors import LawError
+
 Kind = Literal["real", "int", "bool"]
 
 INT_CALLS = {"int"}
@@ -65,11 +67,29 @@ def fields_read(trees: Iterable[ast.AST], owners: Container[str] = ("u",)) -> se
 
 
 def analyse(functions: Mapping[str, ast.FunctionDef]) -> dict[str, Facts]:
-    """Look through functions, callees first."""
+    """Look through functions, callees first.
+
+    Raises
+    ------
+    LawError
+        If a name has letters that most languages do not have in names.
+    """
     known: dict[str, Facts] = {}
     for name, tree in functions.items():
+        insist_on_ascii(tree)
         known[name] = _facts(tree, known)
     return known
+
+
+def insist_on_ascii(tree: ast.FunctionDef) -> None:
+    """Refuse a function with a name in other letters than those of ASCII."""
+    for node in ast.walk(tree):
+        name = getattr(node, "id", None) or getattr(node, "attr", None) or getattr(node, "arg", None)
+        if isinstance(name, str) and not name.isascii():
+            raise LawError(
+                f"{name!r} is no name in other languages; give it another one in the law's file, of the letters a to z and "
+                "A to Z, digits and _"
+            )
 
 
 def merged(functions: Mapping[str, ast.FunctionDef]) -> dict[str, ast.FunctionDef]:

@@ -105,8 +105,10 @@ def _environment() -> jinja2.Environment:
 def render(template: str, **values: Any) -> str:
     """Fill a template of this package; a string is a text of the template's language unless it is `Code`."""
     from stickslip import __version__
+    from stickslip.control.composition import LARGEST
 
-    return str(_environment().get_template(template).render(version=__version__, **values))
+    common = {"version": __version__, "largest": LARGEST}
+    return str(_environment().get_template(template).render({**common, **values}))
 
 
 # ---- texts of a law ----------------------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ import numpy as np
 
 from stickslip.export._analysis import Facts, analyse, merged
 from stickslip.export._c import HEADERS, Dialect, functions, head, safe
+from stickslip.export._guard import guarded
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import in_lines, render, sources, summary
 from stickslip.export.golden import (
@@ -66,7 +67,7 @@ def translated(job: Job) -> dict[str, Any]:
     # The public ones first: they have the right to their names.
     entries = {"_steady": law.steady, "_holding": law.holding, "_step": law.step}
     entries = {name: function for name, function in entries.items() if function}
-    return merged(named(entries, law_layouts(law)))
+    return guarded(merged(named(entries, law_layouts(law))))
 
 
 def write(job: Job) -> Export:

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from stickslip.export._guard import guarded
 from stickslip.export._matlab import functions, local, safe, with_helpers
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import render, summary, text_in
@@ -37,9 +38,9 @@ def write(job: Job) -> Export:
     for entry in ("step", "steady"):
         function = getattr(law, entry)
         if function is not None:
-            files[f"{job.name}_{entry}.m"] = _file(
-                job, entry, functions(named({entry: function}, law_layouts(law)))
-            )
+            trees = named({entry: function}, law_layouts(law))
+            trees = guarded(trees, entry) if entry == "step" else trees
+            files[f"{job.name}_{entry}.m"] = _file(job, entry, functions(trees))
     common = {"x": job.name, "law": law, "bound": repr(BOUND), "steady": law.steady is not None}
     return Export(
         {

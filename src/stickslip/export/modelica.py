@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.export._analysis import merged
+from stickslip.export._guard import guarded
 from stickslip.export._modelica import KEYWORDS, functions, safe
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import Code, in_lines, render, sources, text_in
@@ -44,7 +45,7 @@ def write(job: Job) -> Export:
     # The public ones first: they have the right to their names.
     entries: dict[str, Any] = {"steady": law.steady} if law.steady else {}
     entries |= {"holding": law.holding} if events else {}
-    trees = merged(named({**entries, "step": law.step}, law_layouts(law)))
+    trees = guarded(merged(named({**entries, "step": law.step}, law_layouts(law))), "step")
     parts = functions(trees, counts_in(job.model))
     heads = {name: lines for name, _, lines in parts}
     values: dict[str, Any] = {

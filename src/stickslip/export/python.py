@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from stickslip.export._guard import guarded
 from stickslip.export._step_error import about_steps
 from stickslip.export._text import Code, render, sources
 from stickslip.export.golden import PACE, as_csv, golden_around
@@ -26,7 +27,8 @@ SUBSTEPS = "`contact.step(v0, v1, dt, substeps=4)` divides a step, the velocity 
 def write(job: Job) -> Export:
     """One module, golden vectors, and how to use it."""
     law, p = job.model.law, job.model.parameters
-    trees = named({"step": law.step, **({"steady": law.steady} if law.steady else {})}, law_layouts(law))
+    entries = {"step": law.step, **({"steady": law.steady} if law.steady else {})}
+    trees = guarded(named(entries, law_layouts(law)), "step")
     for tree in trees.values():
         count_by_constant(tree, counts_in(job.model))
         indent_docstring(tree)

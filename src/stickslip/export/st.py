@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from stickslip.export._guard import guarded
 from stickslip.export._hoist import hoisted
 from stickslip.export._st import Names, functions, number
 from stickslip.export._st_names import RESERVED, named_in_st, renamed
@@ -49,7 +50,7 @@ def write(job: Job) -> Export:
     law, p = job.model.law, job.model.parameters
     x = named_in_st([job.name], RESERVED | set(BLOCK))[job.name]
     counts = counts_in(job.model)
-    trees = hoisted(named({"_step": law.step}, law_layouts(law)))
+    trees = hoisted(guarded(named({"_step": law.step}, law_layouts(law))))
     fields = [f.name for f in (*law.fields, *law.state_fields)]
     names = Names.of(trees, x, [*fields, *Surroundings._fields])
     word = names.words
