@@ -210,28 +210,18 @@ def _place(
     """Declare `name` in the innermost block that holds all of its uses."""
     users = [s for s in block if _mentions(s, name, seen)]
     first = users[0]
-    if len(users) == 1:
-        inner = [b for b in _blocks(first) if any(_mentions(s, name, seen) for s in b)]
-        if isinstance(first, ast.For) and isinstance(first.target, ast.Name) and first.target.id == name:
-            return  # the loop declares its own counter
-        outside = _mentions_outside_blocks(first, name, seen)
-        if (
-            len(inner) == 1
-            and not outside
-            and (not isinstance(first, ast.For) or _sets(inner[0], name, seen))
-        ):
-            return _place(name, inner[0], declared, opened, seen)
-        if len(inner) > 1 and not outside and all(_sets(b, name, seen) for b in inner):
-            for each in inner:
-                _place(name, each, declared, opened, seen)
-            return None
+    if isinstance(first, ast.For) and len(users) == 1 and _own_counter(first, name):
+        return  # the loop declares its own counter
+    inner = [b for s in users for b in _blocks(s) if any(_mentions(i, name, seen) for i in b)]
+    passed_down = len(users) == len(inner) == 1 and isinstance(first, ast.If) and not _mentions(first.test, name, seen)
+    if passed_down or all(_is_apart(s, name, seen) for s in users):
+        for each in inner:
+            _place(name, each, declared, opened, seen)
+        return
     if _is_assignment(first, name, seen):
         declared[id(first)] = (*declared.get(id(first), ()), name)
-    elif all(_own_counter(s, name) for s in users):
-        return None
-    else:
+    elif not all(_own_counter(s, name) for s in users):
         opened[id(first)] = (*opened.get(id(first), ()), name)
-    return None
 
 
 def _own_counter(statement: ast.stmt, name: str) -> bool:
@@ -272,6 +262,16 @@ def _is_assignment(statement: ast.stmt, name: str, seen: Seen) -> bool:
         and isinstance(statement.targets[0], ast.Name)
         and statement.targets[0].id == name
         and not _mentions(statement.value, name, seen)
+    )
+
+
+def _is_apart(statement: ast.stmt, name: str, seen: Seen) -> bool:
+    """Whether `name` occurs in blocks of the statement alone, each of which gives it the values that it reads."""
+    if not isinstance(statement, (ast.If, ast.For)) or _mentions_outside_blocks(statement, name, seen):
+        return False
+    blocks = [b for b in _blocks(statement) if any(_mentions(s, name, seen) for s in b)]
+    return all(
+        _sets(b, name, seen) or all(_is_apart(s, name, seen) for s in b if _mentions(s, name, seen)) for b in blocks
     )
 
 

@@ -32,6 +32,8 @@ class ControllerTarget(NamedTuple):
     """``check(export, name)``: run the export in its tool against the golden samples"""
     title: str = ""
     """Of its files, {} for what they hold (`what_it_is`), where it is another one than of a law alone"""
+    declares_units: bool = False
+    """Whether its files declare units: ``write`` then takes ``linear``, whether the axis moves along a line"""
 
 
 def checked_name(name: str) -> str:
