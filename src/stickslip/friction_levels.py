@@ -105,7 +105,7 @@ def end_of_slope(model: Model) -> float:
     0 of a law that withstands torque at rest, that has no torque at constant velocity, or whose curve has no bend.
     """
     law = model.law
-    if law.steady is None or law.holding is not None or law.state_fields or not law.continuous:
+    if law.steady is None or law.holding is not None or law.state_fields:
         return 0.0
     curves = [_Curve(model, side) for side in (1.0, -1.0)]
     return max(curve.end_of_slope for curve in curves) if all(curve.bend for curve in curves) else 0.0

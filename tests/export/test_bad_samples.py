@@ -26,7 +26,11 @@ BAD = (math.nan, math.inf, -math.inf, 1e200)
 MODELS = {
     "lugre": ss.Model("lugre", sigma0=1e3, sigma1=1.0, fc=0.3, fs=0.4, vs=0.1, sigma2=0.01),
     "position": ss.Model(
-        law("dahl").having(position_dependence="spectrum"), sigma0=1e3, fc=0.3, order=(2.0,), ripple=(0.3,),
+        law("dahl").having(position_dependence="spectrum"),
+        sigma0=1e3,
+        fc=0.3,
+        order=(2.0,),
+        ripple=(0.3,),
         ripple_phase=(0.1,),
     ),
     "coulomb": ss.Model("coulomb", fc=0.3, sigma2=0.01),
@@ -181,7 +185,11 @@ for bad = [NaN, Inf, -Inf, 1e200]
 end
 """)
     done = subprocess.run(
-        ["octave-cli", "--norc", "--quiet", "run.m"], cwd=tmp_path, capture_output=True, text=True, check=False
+        ["octave-cli", "--norc", "--quiet", "run.m"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
 

@@ -73,7 +73,9 @@ def test_texts_of_a_law_stay_texts(to, hostile):
     assert made.check is None or made.check.passed is not False, made.check
     for name, text in files_in(made):
         assert visible(text), name
-        assert own_lines(text) or name.endswith((".h", ".st", ".mo")), name  # there an equation has several lines
+        assert own_lines(text) or name.endswith((".h", ".st", ".mo")), (
+            name
+        )  # there an equation has several lines
         insist_on_syntax(name, text)
     assert all(note.isprintable() for note in made.notes)
     assert SAFE in "".join(text for _, text in files_in(made)) or to in ("mujoco", "table")

@@ -235,7 +235,9 @@ def test_a_turn_without_its_doubled_end_point_is_a_whole_turn(rows, first):
     last = first + TURN * 255.0 / 256.0
     record = standstill(plain, places=256, low=first, high=last, rows=rows, unit="A")
     if rows == 1:
-        record = Record(np.arange(512.0), {k: record[k] for k in ("position", "motor_torque")}, dict(record.units))
+        record = Record(
+            np.arange(512.0), {k: record[k] for k in ("position", "motor_torque")}, dict(record.units)
+        )
     found = identify_cogging([record])
     own = found.details["map"]
     assert not any("less than a turn" in note for note in found.notes)

@@ -2,12 +2,14 @@
 
 SAFE = "law with hostile texts"
 ENDS = (
-    "*/", "*)", "/*", "(*", "-->", "--", '"""', "'''", '"', "'", "]]>", "%}", "}", "{", "??/", "|", "`", "<script>", "#",
-    "\\",
+    "*/", "*)", "/*", "(*", "-->", "--", '"""', "'''", '"', "'", "]]>", "%}", "}", "{", "??/", "|", "`", "<script>",
+    "#", "\\",
 )  # fmt: skip
 LINES = ("\n", "\r", "\r\n", "\v", "\f", "\x85", "\u2028", "\u2029", "\x1c")
 CONTROLS = ("\x00", "\x07", "\x1b[31m", "\x7f", "\u202e", "\u2066", "\u200f", "\ufeff", "\ud800")
-BREAKS = "".join((*(f"{end} " for end in ENDS), *(f"{line}PWNED{line}" for line in LINES), *CONTROLS, *ENDS[::-1]))
+BREAKS = "".join(
+    (*(f"{end} " for end in ENDS), *(f"{line}PWNED{line}" for line in LINES), *CONTROLS, *ENDS[::-1])
+)
 """Whatever ends a comment or a string, and a statement on a line of its own behind every kind of line break."""
 LAW = '''
 import math

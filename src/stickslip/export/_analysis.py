@@ -87,8 +87,8 @@ def insist_on_ascii(tree: ast.FunctionDef) -> None:
         name = getattr(node, "id", None) or getattr(node, "attr", None) or getattr(node, "arg", None)
         if isinstance(name, str) and not name.isascii():
             raise LawError(
-                f"{name!r} is no name in other languages; give it another one in the law's file, of the letters a to z and "
-                "A to Z, digits and _"
+                f"{name!r} is no name in other languages; rename it in the law's file, with letters a to z and A to Z, "
+                "digits and _"
             )
 
 
@@ -213,7 +213,9 @@ def _place(
     if isinstance(first, ast.For) and len(users) == 1 and _own_counter(first, name):
         return  # the loop declares its own counter
     inner = [b for s in users for b in _blocks(s) if any(_mentions(i, name, seen) for i in b)]
-    passed_down = len(users) == len(inner) == 1 and isinstance(first, ast.If) and not _mentions(first.test, name, seen)
+    passed_down = (
+        len(users) == len(inner) == 1 and isinstance(first, ast.If) and not _mentions(first.test, name, seen)
+    )
     if passed_down or all(_is_apart(s, name, seen) for s in users):
         for each in inner:
             _place(name, each, declared, opened, seen)
@@ -271,7 +273,8 @@ def _is_apart(statement: ast.stmt, name: str, seen: Seen) -> bool:
         return False
     blocks = [b for b in _blocks(statement) if any(_mentions(s, name, seen) for s in b)]
     return all(
-        _sets(b, name, seen) or all(_is_apart(s, name, seen) for s in b if _mentions(s, name, seen)) for b in blocks
+        _sets(b, name, seen) or all(_is_apart(s, name, seen) for s in b if _mentions(s, name, seen))
+        for b in blocks
     )
 
 

@@ -259,7 +259,8 @@ def archive(
     kind, x, c_files = VERSIONS[fmi], contents.name, dict(contents.sources)
     sources = [f"{x}.c", f"{x}_{kind}.c"]
     units = [
-        {"name": u, "base": Code(BASE_UNITS.get(u, ""))} for u in sorted({"s", *(v.unit for v in variables)} - {""})
+        {"name": u, "base": Code(BASE_UNITS.get(u, ""))}
+        for u in sorted({"s", *(v.unit for v in variables)} - {""})
     ]
     values: dict[str, Any] = {
         "x": x, "fmi": fmi, "core": core, "variables": variables, "about": about, "sources": sources, "units": units,

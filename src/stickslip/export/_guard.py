@@ -47,7 +47,9 @@ def _guard(step: ast.FunctionDef, entry: str, inner: str, read: list[str]) -> as
     arguments = [a.arg for a in step.args.args]
     around = arguments[5]
     sizes = [f"abs({name})" for name in arguments[:3]]
-    sizes += [f"{CLOCK} * abs({around}.{name})" if name == "time" else f"abs({around}.{name})" for name in read]
+    sizes += [
+        f"{CLOCK} * abs({around}.{name})" if name == "time" else f"abs({around}.{name})" for name in read
+    ]
     text = (
         f"def {entry}({', '.join(arguments)}):\n"
         f"    if not {' + '.join(sizes)} < {LARGEST!r}:\n"

@@ -42,8 +42,10 @@ class Curve:
 
     @staticmethod
     def of(model: Model, top: float | None = None, density: int = 1) -> Curve:
-        """The curve up to `top` rad/s; without it, up to 100 times the velocity over which the law changes, and of a law
-        with a smooth sign, whose width that may be, at least up to 1 rad/s."""
+        """Return the curve up to `top` rad/s; without it, up to 100 times the velocity over which the law changes.
+
+        That may be the width of a smooth sign: of a law that has one, the curve goes up to 1 rad/s at least.
+        """
         if top is None:
             bare = independent(model)
             scale = velocity_scale(bare)

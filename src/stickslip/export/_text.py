@@ -8,6 +8,7 @@ or a string there (`text_in`). What is code of that language already is `Code`, 
 from __future__ import annotations
 
 import functools
+import json
 import re
 import textwrap
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,7 @@ LETTERS = {
 C = (r"\*(?=/)", r"/(?=\*)", r"\?(?=\?)")
 """Ends and starts of a comment in C, and trigraphs: a space goes between their letters."""
 SPLIT = {
-    "c": C, "h": C, "ino": C, "comp": C, "mo": C[:2], "st": (r"\((?=\*)", r"\*(?=\))"), 
+    "c": C, "h": C, "ino": C, "comp": C, "mo": C[:2], "st": (r"\((?=\*)", r"\*(?=\))"),
 }  # fmt: skip
 """By the ending of a file, pairs of letters that a text must not have."""
 INSTEAD = {
@@ -49,7 +50,7 @@ class Code(str):
 
 
 def folded(text: str) -> str:
-    """Fold a text to one line of printable characters, without those that control a terminal or the writing direction."""
+    """Fold a text to one printable line, without characters that control a terminal or the writing direction."""
     return "".join(c if c.isprintable() else " " if c.isspace() else "" for c in text)
 
 
@@ -77,6 +78,11 @@ def ascii_only(text: str) -> str:
     for letter, plain in LETTERS.items():
         text = text.replace(letter, plain)
     return text.encode("ascii", "replace").decode()
+
+
+def quoted(text: str | float) -> Code:
+    """A text as a string of YAML and JSON."""
+    return Code(json.dumps(text, ensure_ascii=False))
 
 
 # ---- templates ---------------------------------------------------------------------------------------------------

@@ -161,7 +161,9 @@ def at_rest(controller: Controller) -> str:
 def laws_of(controller: Controller) -> list[str]:
     """Its laws, a line each."""
     return [
-        "; ".join([f"{part}: {block.law.title}", *([", ".join(block.law.source)] if block.law.source else [])])
+        "; ".join(
+            [f"{part}: {block.law.title}", *([", ".join(block.law.source)] if block.law.source else [])]
+        )
         for part, block in controller.blocks.items()
     ]
 

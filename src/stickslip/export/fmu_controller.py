@@ -80,7 +80,11 @@ def surroundings_read(controller: Controller) -> Iterable[Variable]:
 
 
 def write(
-    controller: Controller, name: str, single: bool = False, around: Surroundings = STILL, linear: bool = False
+    controller: Controller,
+    name: str,
+    single: bool = False,
+    around: Surroundings = STILL,
+    linear: bool = False,
 ) -> Export:
     """A unit of each version, golden samples, and how to use them."""
     c = c99_controller.write(controller, name, around=around).files
@@ -129,4 +133,6 @@ def check(export: Export, name: str) -> Check:
     return checked(export, time, dt, given, {"torque": expected})
 
 
-CONTROLLER = ControllerTarget(write, check, "FMI 2.0 and 3.0 co-simulation unit of a sampled {}", declares_units=True)
+CONTROLLER = ControllerTarget(
+    write, check, "FMI 2.0 and 3.0 co-simulation unit of a sampled {}", declares_units=True
+)

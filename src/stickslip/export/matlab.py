@@ -62,7 +62,12 @@ def _file(job: Job, entry: str, parts: list[tuple[str, str, list[str]]]) -> str:
     head = lines[0].replace(own, public, 1)
     if entry == "step":  # of every law alike, also of one without memory
         head = head.replace("[torque_]", "[torque_, z]")
-    lines = [head, comment(summary(own_name, about)), comment(f"{job.model.law.title}. SI units."), *lines[1:]]
+    lines = [
+        head,
+        comment(summary(own_name, about)),
+        comment(f"{job.model.law.title}. SI units."),
+        *lines[1:],
+    ]
     text = [*lines, ""]
     for name, doc, code in inner:
         text += [code[0], comment(summary(name, doc)), *code[1:], ""]

@@ -2,7 +2,8 @@
 
 Coulomb and viscous friction is the joint's ``frictionloss`` and ``damping``; LuGre friction, with a Stribeck shape
 factor of 2, is the ``lugre`` attribute of a passive ``dcmotor`` actuator (MuJoCo 4.0 or later), with ``damping`` for
-the viscous part. A difference between the directions is a constant torque: a ``general`` actuator. The inertia is the joint's ``armature``. Attributes as in MuJoCo's XML reference.
+the viscous part. A difference between the directions is a constant torque: a ``general`` actuator. The inertia is the
+joint's ``armature``. Attributes as in MuJoCo's XML reference.
 """
 
 from __future__ import annotations
@@ -20,7 +21,17 @@ from stickslip.export._mujoco_read import Part, joint_named, parts
 from stickslip.export._mujoco_run import drift, pulled, spring
 from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
-from stickslip.export.nearest import COULOMB, Curve, Form, Nearest, bristle_of, carried, fit_stribeck, parted, with_constant
+from stickslip.export.nearest import (
+    COULOMB,
+    Curve,
+    Form,
+    Nearest,
+    bristle_of,
+    carried,
+    fit_stribeck,
+    parted,
+    with_constant,
+)
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 from stickslip.spec import Surroundings
@@ -205,7 +216,11 @@ def with_difference(model: Model, constant: float) -> Model:
     law, values = model.law.having(symmetry="asymmetric"), model.parameters._asdict()
     twins = {f.name: values[f.name.removesuffix(NEGATIVE)] for f in law.fields if f.name.endswith(NEGATIVE)}
     levels = {"fc", "fs"} & values.keys()
-    values |= twins | {n: values[n] + constant for n in levels} | {n + NEGATIVE: values[n] - constant for n in levels}
+    values |= (
+        twins
+        | {n: values[n] + constant for n in levels}
+        | {n + NEGATIVE: values[n] - constant for n in levels}
+    )
     return Model(law, **values)
 
 

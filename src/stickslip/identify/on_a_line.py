@@ -12,7 +12,7 @@ from stickslip.machines.servo import ServoAxis
 
 LINEAR = ServoAxis(motion="linear")
 UNITS = re.compile(r"(?<![A-Za-z0-9_.])([mµk]?)(N[·*.]m|kg[·*.]m(?:²|\^2|2)|rad)(?![A-Za-z0-9_]|\.[A-Za-z])")
-"""A unit in a sentence, a label or a comment, perhaps with a prefix, also in ASCII's letters or as Modelica writes it; no part of an identifier
+"""A unit in a sentence, a label or a comment, perhaps with a prefix, also in ASCII's letters; no part of an identifier
 or of a file's name."""
 ALONG = {"N": "N", "k": "kg", "r": "m"}
 """What it is along a line, by its first letter."""

@@ -388,7 +388,9 @@ def job_of(source: Source, content: Table, name: str, chosen: Target) -> Job:
     linear = is_linear(content.values)
     if linear and any(s.name == "motion" for s in chosen.settings):
         settings["motion"] = "linear"
-    return Job(model_of(source, content), name, top_speed=fastest_recorded(content), linear=linear, settings=settings)
+    return Job(
+        model_of(source, content), name, top_speed=fastest_recorded(content), linear=linear, settings=settings
+    )
 
 
 def fastest_recorded(content: Table) -> float | None:

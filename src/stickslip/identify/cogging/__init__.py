@@ -155,9 +155,7 @@ def chosen_terms(places: Places, orders: Orders, moving: Sequence[str]) -> tuple
     return fit(places, terms, moving), choice, terms
 
 
-def map_of(
-    found: Fit, places: Places, unit: str, choice: Choice, bounds: tuple[float, float]
-) -> PositionMap:
+def map_of(found: Fit, places: Places, unit: str, choice: Choice, bounds: tuple[float, float]) -> PositionMap:
     """Harmonics; the table too, where it is the better one."""
 
     def waves(part: str) -> Waves:
