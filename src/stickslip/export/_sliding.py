@@ -73,7 +73,7 @@ class Curve:
         return float(slow[creeps][-1]) if slope[0] > 2.0 * slope[-1] else 0.0
 
     @cached_property
-    def sliding(self) -> Array:
+    def sliding(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """Whether the law slides at each velocity, not on the slope of a smooth sign; all, where that goes on to half
         of the range."""
         end = end_of_slope(self.model)

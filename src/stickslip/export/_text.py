@@ -11,6 +11,7 @@ import functools
 import json
 import re
 import textwrap
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -25,17 +26,17 @@ LETTERS = {
 }  # fmt: skip
 C = (r"\*(?=/)", r"/(?=\*)", r"\?(?=\?)")
 """Ends and starts of a comment in C, and trigraphs: a space goes between their letters."""
-SPLIT = {
-    "c": C, "h": C, "ino": C, "comp": C, "mo": C[:2], "st": (r"\((?=\*)", r"\*(?=\))"),
+ST = (r"\((?=\*)", r"\*(?=\))")
+SPLIT: Mapping[str, tuple[str, ...]] = {
+    "c": C, "h": C, "ino": C, "comp": C, "mo": C[:2], "st": ST, "TcPOU": (*ST, r"\](?=\])"),
 }  # fmt: skip
 """By the ending of a file, pairs of letters that a text must not have."""
-INSTEAD = {
-    "comp": {'"': "'", "\\": "/"}, "mo": {'"': "'", "\\": "/"}, "py": {'"': "'"}, "md": {"<": "&lt;", "|": "\\|"},
-    "xml": {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "--": "-&#45;"},
+XML = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "--": "-&#45;"}
+STRING = {'"': "'", "\\": "/"}
+INSTEAD: Mapping[str, Mapping[str, str]] = {
+    "comp": STRING, "mo": STRING, "py": {'"': "'"}, "md": {"<": "&lt;", "|": "\\|"}, "xml": XML, "urdf": XML,
 }  # fmt: skip
 """By the ending of a file, what would end a string, a cell or an attribute, and what stands for it."""
-SPLIT["TcPOU"] = (*SPLIT["st"], r"\](?=\])")
-INSTEAD["urdf"] = INSTEAD["xml"]
 UNICODE = ("md", "py", "xml", "urdf")
 """Endings of files that are read as UTF-8 everywhere; others have ASCII."""
 
