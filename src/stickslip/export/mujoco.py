@@ -94,12 +94,17 @@ def write(job: Job) -> Export:
     wanted = settings_of(TARGET, job.settings)
     step, inertia = float(wanted["timestep"]), float(wanted["inertia"])
     model, notes = for_timestep(found, step, inertia, str(wanted["contact"]))
+    if constant := parted(model)[1]:
+        notes = (
+            *notes,
+            f"half of the difference between the directions, {constant:.4g} N·m against positive motion, is a constant "
+            "torque: the `general` actuator gives it, whatever its input; copy it with the joint",
+        )
     text = xml(job, model)
     table = pulled(text, job.model, inertia, step) if importlib.util.find_spec("mujoco") else []
     values: dict[str, Any] = {
         "x": job.name, "joint": wanted["joint"], "law": job.model.law, "notes": notes, "table": table,
         "lugre": model.law.name == "lugre", "spring": f"{spring(step):.3g}", "hold": holding_step(model),
-        "constant": f"{parted(model)[1]:.6g}" if parted(model)[1] else "",
     }  # fmt: skip
     return Export({f"{job.name}.xml": text, "README.md": render("mujoco_readme.md.j2", **values)}, notes)
 

@@ -6,7 +6,6 @@ their targets (`Job.linear`); here the units in the words of all other files fol
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 from stickslip.export.job import Check, Export
@@ -32,7 +31,7 @@ def along_a_line(export: Export, target: str, own: str) -> Export:
     if target in ROTARY_ONLY or UNITS.fullmatch(own):
         return Export(export.files, (*notes, STANDS_FOR))
     files = {name: _text(name, content) for name, content in export.files.items()}
-    turns = any(re.search(r"\bturns?\b", content) for content in files.values() if isinstance(content, str))
+    turns = any("whole turns" in content for content in files.values() if isinstance(content, str))
     return Export(files, (*notes, TURN) if turns else notes)
 
 
