@@ -147,7 +147,8 @@ def test_the_nearest_of_an_asymmetric_law_keeps_its_bristle():
 NESTED = """<mujoco>
  <default><joint frictionloss="0.1" damping="0.01"/>
   <default class="arm"><joint frictionloss="0.2"/><default class="hand"><joint damping="0.05"/></default></default>
-  <default class="driven"><dcmotor input="none" motorconst="0" resistance="1" lugre="300 0.1 0.28 0.33 0.1"/></default></default>
+  <default class="driven"><dcmotor input="none" motorconst="0" resistance="1" lugre="300 0.1 0.28 0.33 0.1"/></default>
+ </default>
  <worldbody>
   <body><joint name="base"/><geom size="1"/>
    <body childclass="arm"><joint name="elbow"/><geom size="1"/>

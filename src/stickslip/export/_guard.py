@@ -11,7 +11,9 @@ from collections.abc import Mapping
 
 from stickslip.control.composition import LARGEST
 from stickslip.export._analysis import fields_read
+from stickslip.export._text import first_line
 
+REFUSES = "An input that is no finite number gives 0 and leaves the state as it is."
 CLOCK = 1e-6
 """Factor on the time: clocks that count from 1970 are beyond `LARGEST` seconds."""
 
@@ -58,6 +60,6 @@ def _guard(step: ast.FunctionDef, entry: str, inner: str, read: list[str]) -> as
     )
     made = ast.parse(text).body[0]
     assert isinstance(made, ast.FunctionDef)
-    if ast.get_docstring(step) is not None:
-        made.body.insert(0, step.body[0])
+    about = first_line(ast.get_docstring(step) or "") or "Torque at the end of the step, N·m."
+    made.body.insert(0, ast.Expr(ast.Constant(f"{about.rstrip('.')}. {REFUSES}")))
     return made
