@@ -99,6 +99,18 @@ def static_level(model: Model, direction: float = 1.0) -> float:
     return _Curve(model, direction).static
 
 
+def end_of_slope(model: Model) -> float:
+    """The velocity at which a smooth sign, or another slope through rest, has ended in both directions, rad/s.
+
+    0 of a law that withstands torque at rest, that has no torque at constant velocity, or whose curve has no bend.
+    """
+    law = model.law
+    if law.steady is None or law.holding is not None or law.state_fields:
+        return 0.0
+    curves = [_Curve(model, side) for side in (1.0, -1.0)]
+    return max(curve.end_of_slope for curve in curves) if all(curve.bend for curve in curves) else 0.0
+
+
 def line_beyond(model: Model, direction: float = 1.0) -> tuple[float, float]:
     """Level, N·m, and slope, N·m·s/rad and not negative, of friction beyond the Stribeck effect, for +1 or -1.
 
@@ -201,6 +213,11 @@ class _Curve:
         v, torque = self._let_go()
         static = torque - self.viscous * v
         return static if static > NO_LEVEL * abs(self.torque(BEYOND[1] * self.scale)) else 0.0
+
+    @property
+    def end_of_slope(self) -> float:
+        """At which the slope through rest has ended, rad/s."""
+        return self._let_go()[0]
 
     @property
     def stribeck_velocity(self) -> float:

@@ -147,7 +147,8 @@ def test_the_nearest_of_an_asymmetric_law_keeps_its_bristle():
 NESTED = """<mujoco>
  <default><joint frictionloss="0.1" damping="0.01"/>
   <default class="arm"><joint frictionloss="0.2"/><default class="hand"><joint damping="0.05"/></default></default>
-  <default class="driven"><dcmotor lugre="300 0.1 0.28 0.33 0.1"/></default></default>
+  <default class="driven"><dcmotor input="none" motorconst="0" resistance="1" lugre="300 0.1 0.28 0.33 0.1"/></default>
+ </default>
  <worldbody>
   <body><joint name="base"/><geom size="1"/>
    <body childclass="arm"><joint name="elbow"/><geom size="1"/>
@@ -243,3 +244,55 @@ def test_the_softened_contact_slips_as_ours_where_the_identified_one_does_not(en
 def test_the_readme_has_the_table(engine):
     text = write(job(Model("coulomb", fc=0.285))).files["README.md"]
     assert sum(line.startswith("| 0.") for line in text.splitlines()) == 3
+
+
+# ---- friction that differs between the directions ----------------------------------------------------------------
+
+ASYMMETRIC = {
+    "coulomb": {"fc": 0.3, "fc_negative": 0.26, "sigma2": 0.01, "sigma2_negative": 0.01},
+    "lugre": {**LUGRE, "delta_s": 2.0},
+}
+for _name in ("fc", "fs", "vs", "delta_s", "sigma2"):
+    ASYMMETRIC["lugre"][f"{_name}_negative"] = ASYMMETRIC["lugre"][_name] - 0.05 * (_name in ("fc", "fs"))
+
+
+def asymmetric(law, **other):
+    return Model(plugins.law(law).having(symmetry="asymmetric"), **{**ASYMMETRIC[law], **other})
+
+
+@pytest.mark.parametrize("law", ["coulomb", "lugre"])
+def test_half_the_difference_between_the_directions_is_a_constant_torque(law):
+    model = asymmetric(law)
+    made = write(job(model))
+    assert not any("not carried" in note for note in made.notes)
+    assert "constant torque" in made.files["README.md"]
+    again = read(made.files["axis.xml"])
+    assert again.law.chosen["symmetry"] == "asymmetric"
+    assert again.parameters._asdict() == pytest.approx(model.parameters._asdict(), rel=1e-12)
+
+
+def test_a_difference_that_changes_with_the_velocity_is_named_and_its_mean_kept():
+    model = asymmetric("coulomb", sigma2_negative=0.02)
+    with pytest.raises(CannotCarry, match="the change of the difference between the directions"):
+        write(job(model))
+    made = write(job(model, nearest=True))
+    again = read(made.files["axis.xml"]).parameters
+    assert again.fc - again.fc_negative == pytest.approx(
+        0.04 - 0.01 * 0.5, abs=1e-3
+    )  # the mean up to 1 rad/s
+    assert again.sigma2 == again.sigma2_negative == pytest.approx(0.015)
+
+
+def test_symmetric_friction_has_no_constant_torque():
+    made = write(job(Model("coulomb", fc=0.3, sigma2=0.01)))
+    assert "<actuator>" not in made.files["axis.xml"]
+    assert "constant torque" not in made.files["README.md"]
+
+
+def test_mujoco_withstands_as_much_in_each_direction_as_the_law():
+    mujoco = pytest.importorskip("mujoco")
+    loaded = mujoco.MjModel.from_xml_string(
+        text_of(asymmetric("coulomb", fc_negative=0.2, sigma2_negative=0.01))
+    )
+    for torque, moves in ((0.28, False), (0.32, True), (-0.18, False), (-0.22, True)):
+        assert (drift(loaded, torque) > 0.1) == moves, torque

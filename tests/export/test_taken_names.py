@@ -141,3 +141,19 @@ def test_the_nearest_law_of_a_robot_keeps_the_damping(own):
     made = ss.export(own(), to="urdf", nearest=True, name="joint").files["joint.urdf"]
     damping = float(made.partition('damping="')[2].partition('"')[0])
     assert damping == pytest.approx(0.02, rel=0.1)
+
+
+@pytest.mark.parametrize("slope", [20.0, 200.0, 2000.0])
+@pytest.mark.parametrize("top", [None, 4.0])
+def test_the_nearest_law_of_a_smooth_sign_has_its_level_and_damping(slope, top, own, tmp_path):
+    """The slope of the sign was fitted too: a damping of 0.052 in place of 0.02."""
+    file = tmp_path / "smooth.py"
+    file.write_text(OWN.replace("math.copysign(shape(v, p), v)", f"math.tanh({slope} * v) * p.level"))
+    model = ss.Model(str(file), level=0.5, excess=0.0, slow=1.0, damping=0.02)
+    made = ss.export(model, to="urdf", nearest=True, top_speed=top, name="joint")
+    dynamics = made.files["joint.urdf"].partition("<dynamics ")[2]
+    friction, damping = (
+        float(dynamics.partition(f'{key}="')[2].partition('"')[0]) for key in ("friction", "damping")
+    )
+    assert friction == pytest.approx(0.5, rel=1e-3)
+    assert damping == pytest.approx(0.02, rel=0.02)

@@ -11,6 +11,7 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError, UnknownName
+from stickslip.export.maps import map_target, written
 from stickslip.identify.cogging import identify_cogging
 from stickslip.identify.cogging.moving import speed_control
 from stickslip.identify.methods import method_named
@@ -225,6 +226,31 @@ def test_less_than_a_turn_says_what_it_cannot_know():
     assert np.std(own.beside(inside) - true - np.mean(own.beside(inside) - true)) < 0.05 * np.std(true)
     assert any("less than a turn" in n for n in found.notes)
     assert "whole turn" in found.measure_next[0]
+
+
+@pytest.mark.parametrize("rows", [1, 5])
+@pytest.mark.parametrize("first", [0.0, -np.pi, 100.0])
+def test_a_turn_without_its_doubled_end_point_is_a_whole_turn(rows, first):
+    """Place 0 is the neighbour of the last place, whether the record has one row at each place or several."""
+    last = first + TURN * 255.0 / 256.0
+    record = standstill(plain, places=256, low=first, high=last, rows=rows, unit="A")
+    if rows == 1:
+        record = Record(
+            np.arange(512.0), {k: record[k] for k in ("position", "motor_torque")}, dict(record.units)
+        )
+    found = identify_cogging([record])
+    own = found.details["map"]
+    assert not any("less than a turn" in note for note in found.notes)
+    assert written(own, map_target("moteus"), "cogging").files
+    angle = np.linspace(first, first + TURN, 500)
+    assert np.std(own.beside(angle) - COGGING.at(angle)) < 0.1 * np.std(COGGING.at(angle))
+
+
+def test_a_turn_with_a_wider_gap_at_its_end_is_refused():
+    found = identify_cogging([standstill(plain, places=256, high=TURN * 252.0 / 256.0)])
+    assert any("less than a turn" in note for note in found.notes)
+    with pytest.raises(InputError, match="identify a whole turn"):
+        written(found.details["map"], map_target("c99"), "cogging")
 
 
 def test_orders_behind_a_gear_are_fractions_of_a_turn():

@@ -11,6 +11,8 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from stickslip.errors import LawError
+
 Kind = Literal["real", "int", "bool"]
 
 INT_CALLS = {"int"}
@@ -65,11 +67,29 @@ def fields_read(trees: Iterable[ast.AST], owners: Container[str] = ("u",)) -> se
 
 
 def analyse(functions: Mapping[str, ast.FunctionDef]) -> dict[str, Facts]:
-    """Look through functions, callees first."""
+    """Look through functions, callees first.
+
+    Raises
+    ------
+    LawError
+        If a name has letters that most languages do not have in names.
+    """
     known: dict[str, Facts] = {}
     for name, tree in functions.items():
+        insist_on_ascii(tree)
         known[name] = _facts(tree, known)
     return known
+
+
+def insist_on_ascii(tree: ast.FunctionDef) -> None:
+    """Refuse a function with a name in other letters than those of ASCII."""
+    for node in ast.walk(tree):
+        name = getattr(node, "id", None) or getattr(node, "attr", None) or getattr(node, "arg", None)
+        if isinstance(name, str) and not name.isascii():
+            raise LawError(
+                f"{name!r} is no name in other languages; rename it in the law's file, with letters a to z and A to Z, "
+                "digits and _"
+            )
 
 
 def merged(functions: Mapping[str, ast.FunctionDef]) -> dict[str, ast.FunctionDef]:
@@ -190,28 +210,20 @@ def _place(
     """Declare `name` in the innermost block that holds all of its uses."""
     users = [s for s in block if _mentions(s, name, seen)]
     first = users[0]
-    if len(users) == 1:
-        inner = [b for b in _blocks(first) if any(_mentions(s, name, seen) for s in b)]
-        if isinstance(first, ast.For) and isinstance(first.target, ast.Name) and first.target.id == name:
-            return  # the loop declares its own counter
-        outside = _mentions_outside_blocks(first, name, seen)
-        if (
-            len(inner) == 1
-            and not outside
-            and (not isinstance(first, ast.For) or _sets(inner[0], name, seen))
-        ):
-            return _place(name, inner[0], declared, opened, seen)
-        if len(inner) > 1 and not outside and all(_sets(b, name, seen) for b in inner):
-            for each in inner:
-                _place(name, each, declared, opened, seen)
-            return None
+    if isinstance(first, ast.For) and len(users) == 1 and _own_counter(first, name):
+        return  # the loop declares its own counter
+    inner = [b for s in users for b in _blocks(s) if any(_mentions(i, name, seen) for i in b)]
+    passed_down = (
+        len(users) == len(inner) == 1 and isinstance(first, ast.If) and not _mentions(first.test, name, seen)
+    )
+    if passed_down or all(_is_apart(s, name, seen) for s in users):
+        for each in inner:
+            _place(name, each, declared, opened, seen)
+        return
     if _is_assignment(first, name, seen):
         declared[id(first)] = (*declared.get(id(first), ()), name)
-    elif all(_own_counter(s, name) for s in users):
-        return None
-    else:
+    elif not all(_own_counter(s, name) for s in users):
         opened[id(first)] = (*opened.get(id(first), ()), name)
-    return None
 
 
 def _own_counter(statement: ast.stmt, name: str) -> bool:
@@ -252,6 +264,17 @@ def _is_assignment(statement: ast.stmt, name: str, seen: Seen) -> bool:
         and isinstance(statement.targets[0], ast.Name)
         and statement.targets[0].id == name
         and not _mentions(statement.value, name, seen)
+    )
+
+
+def _is_apart(statement: ast.stmt, name: str, seen: Seen) -> bool:
+    """Whether `name` occurs in blocks of the statement alone, each of which gives it the values that it reads."""
+    if not isinstance(statement, (ast.If, ast.For)) or _mentions_outside_blocks(statement, name, seen):
+        return False
+    blocks = [b for b in _blocks(statement) if any(_mentions(s, name, seen) for s in b)]
+    return all(
+        _sets(b, name, seen) or all(_is_apart(s, name, seen) for s in b if _mentions(s, name, seen))
+        for b in blocks
     )
 
 

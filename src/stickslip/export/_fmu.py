@@ -24,8 +24,9 @@ from typing import Any
 from stickslip.export import c99
 from stickslip.export._analysis import fields_read
 from stickslip.export._c import safe
-from stickslip.export._text import ascii_only, render
+from stickslip.export._text import Code, render
 from stickslip.export.job import Job
+from stickslip.identify.on_a_line import words
 from stickslip.spec import Field, Surroundings
 
 VERSIONS = {"2.0": "fmi2", "3.0": "fmi3"}
@@ -35,6 +36,8 @@ BASE_UNITS = {
     "s": 's="1"', "rad": 'rad="1"', "rad/s": 'rad="1" s="-1"', "rad/s2": 'rad="1" s="-2"', "kg.m2": 'kg="1" m="2"',
     "N.m": 'kg="1" m="2" s="-2"', "degC": 'K="1" offset="273.15"', "1/K": 'K="-1"', "1/rad": 'rad="-1"',
     "N.m/rad": 'kg="1" m="2" s="-2" rad="-1"', "N.m.s/rad": 'kg="1" m="2" s="-1" rad="-1"',
+    "m": 'm="1"', "m/s": 'm="1" s="-1"', "m/s2": 'm="1" s="-2"', "kg": 'kg="1"', "N": 'kg="1" m="1" s="-2"',
+    "1/m": 'm="-1"', "N/m": 'kg="1" s="-2"', "N.s/m": 'kg="1" s="-1"',
 }  # fmt: skip
 """Of the units of most laws; a unit without them is a name to the importer, and legal."""
 SURROUNDINGS = {"position": "rad", "load": "", "temperature": "degC", "applied": "N.m"}
@@ -93,7 +96,7 @@ class Variable:
         """Attributes ``min`` and ``max``; the standard's bounds include their ends."""
         low = 0.0 if self.positive else self.lower
         bounds = {"min": low, "max": self.upper}
-        return "".join(f' {name}="{value!r}"' for name, value in bounds.items() if value is not None)
+        return Code("".join(f' {name}="{value!r}"' for name, value in bounds.items() if value is not None))
 
     @property
     def bounds(self) -> str:
@@ -110,6 +113,11 @@ def unit_named(unit: str) -> str:
     for letter, other in (("·", "."), ("²", "2"), ("³", "3"), ("°C", "degC"), ("(", ""), (")", "")):
         plain = plain.replace(letter, other)
     return plain
+
+
+def along_a_line(unit: str) -> str:
+    """The unit of a linear axis in place of that of a rotary one: N for N.m, m for rad, kg for kg.m2."""
+    return unit.replace("kg.m2", "kg").replace("N.m", "N").replace("rad", "m")
 
 
 def law_variables(job: Job) -> Iterable[Variable]:
@@ -158,14 +166,15 @@ def surroundings_read(job: Job) -> Iterable[Variable]:
             )
 
 
-def numbered(variables: Iterable[Variable]) -> list[Variable]:
-    """The variables with value references from 1, and names that are each other's different."""
+def numbered(variables: Iterable[Variable], linear: bool = False) -> list[Variable]:
+    """The variables with value references from 1, names that are each other's different, and the units of the axis."""
     out: list[Variable] = []
     taken = {"time"}
     for v in variables:
         name = v.name if v.name not in taken else f"contact.{v.name}"
         taken.add(name)
-        out.append(replace(v, name=name, reference=len(out) + 1))
+        unit = along_a_line(v.unit) if linear else v.unit
+        out.append(replace(v, name=name, unit=unit, reference=len(out) + 1))
     return out
 
 
@@ -185,6 +194,8 @@ class Contents:
         The names of these parameters.
     holding : bool
         Whether the sources have a function that says whether the contact holds.
+    linear : bool
+        Whether the axis moves along a line.
     """
 
     name: str
@@ -193,17 +204,19 @@ class Contents:
     wholes: Sequence[Sequence[str]] = ()
     shared: str = ""
     holding: bool = False
+    linear: bool = False
 
 
 def contents_of(job: Job) -> Contents:
     """A law and its C."""
     x, law = job.name, job.model.law
     return Contents(
-        x, ascii_only(law.title),
+        x, law.title,
         {name: str(text) for name, text in c99.write(job).files.items() if name in (f"{x}.c", f"{x}.h")},
         wholes_of(law.fields, job.model.parameters._asdict()),
         ", ".join(f.name for f in law.fields if f.par.shares),
         "_holding" in c99.translated(job),
+        job.linear,
     )  # fmt: skip
 
 
@@ -246,7 +259,8 @@ def archive(
     kind, x, c_files = VERSIONS[fmi], contents.name, dict(contents.sources)
     sources = [f"{x}.c", f"{x}_{kind}.c"]
     units = [
-        {"name": u, "base": BASE_UNITS.get(u)} for u in sorted({"s", *(v.unit for v in variables)} - {""})
+        {"name": u, "base": Code(BASE_UNITS.get(u, ""))}
+        for u in sorted({"s", *(v.unit for v in variables)} - {""})
     ]
     values: dict[str, Any] = {
         "x": x, "fmi": fmi, "core": core, "variables": variables, "about": about, "sources": sources, "units": units,
@@ -256,6 +270,8 @@ def archive(
     described = render(f"fmu_{kind}.xml.j2", token="", **values)
     token = str(uuid.uuid5(uuid.NAMESPACE_URL, described + "".join(map(str, c_files.values()))))
     c_files[f"{x}_{kind}.c"] = render(f"fmu_{kind}.c.j2", token=token, **values)
+    if contents.linear:
+        c_files = {name: words(text) for name, text in c_files.items()}
     files: dict[str, str | bytes] = {
         "modelDescription.xml": render(f"fmu_{kind}.xml.j2", token=token, **values),
         **{f"sources/{name}": text for name, text in c_files.items()},

@@ -14,6 +14,7 @@ from typing import ClassVar
 from stickslip.export._analysis import Facts, analyse
 from stickslip.export._hoist import hoisted
 from stickslip.export._language import ATOM, CONDITION, Language
+from stickslip.export._text import first_line, text_in
 
 RECORDS = {"z": "State", "p": "Parameters", "u": "Surroundings"}
 KEYWORDS = {
@@ -230,8 +231,7 @@ def last_returns(block: Sequence[ast.stmt]) -> Iterator[int]:
 
 def head(name: str, tree: ast.FunctionDef, facts: Facts) -> list[str]:
     """The declarations of a function, up to its algorithm."""
-    doc = (ast.get_docstring(tree) or "").strip()
-    about = doc.splitlines()[0].replace("\\", "/").replace('"', "'") if doc else ""
+    about = text_in("mo", first_line(ast.get_docstring(tree) or ""))
     lines = [f"function {own_name(name)}" + (f' "{about}"' if about else "")]
     stored = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
     changed = [a for a in facts.arguments if a in facts.writes]

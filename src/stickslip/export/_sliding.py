@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.friction_levels import bends_of, independent, static_level
+from stickslip.friction_levels import bends_of, end_of_slope, independent, static_level
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
@@ -17,6 +17,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SCALES = 100.0
 """Stribeck velocities up to which a sliding curve is compared where nothing else is said."""
+USUAL = 1.0
+"""rad/s: up to which it is compared where the law does not determine a velocity."""
 WAY = 200
 """Steps of 1 mrad after which a law without sliding curve slides as it always will."""
 
@@ -40,10 +42,15 @@ class Curve:
 
     @staticmethod
     def of(model: Model, top: float | None = None, density: int = 1) -> Curve:
-        """The curve up to `top` rad/s; without it, up to 100 times the velocity over which the law changes."""
+        """Return the curve up to `top` rad/s; without it, up to 100 times the velocity over which the law changes.
+
+        That may be the width of a smooth sign: of a law that has one, the curve goes up to 1 rad/s at least.
+        """
         if top is None:
-            scale = velocity_scale(independent(model))
-            top = SCALES * scale if scale > 0.0 else 1.0
+            bare = independent(model)
+            scale = velocity_scale(bare)
+            least = USUAL if scale == 0.0 or end_of_slope(bare) > 0.0 else 0.0
+            top = max(SCALES * scale, least)
         return Curve(model, top, density)
 
     @cached_property
@@ -64,6 +71,13 @@ class Curve:
         slope = torques / slow
         creeps = slope >= (1.0 - 1e-6) * slope[0]
         return float(slow[creeps][-1]) if slope[0] > 2.0 * slope[-1] else 0.0
+
+    @cached_property
+    def sliding(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Whether the law slides at each velocity, not on the slope of a smooth sign; all, where that goes on to half
+        of the range."""
+        end = end_of_slope(self.model)
+        return self.velocity >= (end if end < 0.5 * self.top else 0.0)
 
     @cached_property
     def velocity(self) -> Array:

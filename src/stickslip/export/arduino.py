@@ -10,7 +10,7 @@ from typing import Any
 
 from stickslip.export import c99
 from stickslip.export._c import HEADERS
-from stickslip.export._text import ascii_only, render
+from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target
 from stickslip.spec import Surroundings
@@ -31,7 +31,7 @@ def write(job: Job) -> Export:
     c = c99.write(single).files
     x = job.name
     values: dict[str, Any] = {
-        "x": x, "title": ascii_only(job.model.law.title),
+        "x": x, "title": job.model.law.title,
         "surroundings": ", ".join(f"{u!r}f" for u in Surroundings()), "sample_time": 1e-3,
     }  # fmt: skip
     return Export(

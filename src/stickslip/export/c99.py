@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import shutil
 import subprocess
-import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -21,8 +20,9 @@ import numpy as np
 
 from stickslip.export._analysis import Facts, analyse, merged
 from stickslip.export._c import HEADERS, Dialect, functions, head, safe
+from stickslip.export._guard import guarded
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import ascii_only, render, sources, summary
+from stickslip.export._text import in_lines, render, sources, summary
 from stickslip.export.golden import (
     PACE,
     Golden,
@@ -67,7 +67,7 @@ def translated(job: Job) -> dict[str, Any]:
     # The public ones first: they have the right to their names.
     entries = {"_steady": law.steady, "_holding": law.holding, "_step": law.step}
     entries = {name: function for name, function in entries.items() if function}
-    return merged(named(entries, law_layouts(law)))
+    return guarded(merged(named(entries, law_layouts(law))))
 
 
 def write(job: Job) -> Export:
@@ -82,10 +82,10 @@ def write(job: Job) -> Export:
     room = jumps_of(job, vectors)
     common: dict[str, Any] = {
         "substeps_head": substeps_head(dialect, known["_step"]), "step_arguments": known["_step"].arguments,
-        "x": job.name, "X": job.name.upper(), "title": ascii_only(law.title), "real": dialect.real,
+        "x": job.name, "X": job.name.upper(), "title": law.title, "real": dialect.real,
         "counts": {dialect.count(n): size for n, size in counts_in(job.model).items()},
-        "source": ascii_only(sources(law)),
-        "equation": textwrap.wrap(ascii_only(law.equation), 110, break_long_words=False),
+        "source": sources(law),
+        "equation": in_lines(law.equation),
         "surroundings": ", ".join(dialect.number(x) for x in Surroundings()),
         "moved": isinstance(vectors, Surrounded), "columns": len(vectors),
         "depends": read_by(job.model),
@@ -178,7 +178,7 @@ def structure(name: str, about: str, fields: Sequence[Field], dialect: Dialect) 
     lines = [
         {
             "declared": f"{dialect.real} {safe(f.name)}{place_of(f, dialect)};",
-            "meaning": ascii_only(f"{f.par.meaning}, {f.par.unit}"),
+            "meaning": f"{f.par.meaning}, {f.par.unit}",
         }
         for f in fields
     ]
@@ -212,7 +212,7 @@ def initial(
     for f in fields:
         value = values[f.name]
         numbers = ", ".join(dialect.number(float(x)) for x in (value if f.per_element else (value,)))
-        about = ascii_only(f"{f.name}: {f.par.meaning}, {f.par.unit}")
+        about = f"{f.name}: {f.par.meaning}, {f.par.unit}"
         yield {"value": f"{{ {numbers} }}" if f.per_element else numbers, "about": about}
     if not fields:
         yield {"value": "0", "about": "this law has none"}

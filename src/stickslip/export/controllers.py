@@ -12,7 +12,6 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.export._analysis import merged
-from stickslip.export._text import ascii_only
 from stickslip.export.golden import Samples, changing, random_motion, sampled_torques
 from stickslip.export.job import IDENTIFIER, Check, Export
 from stickslip.export.nearest import read_by
@@ -33,6 +32,8 @@ class ControllerTarget(NamedTuple):
     """``check(export, name)``: run the export in its tool against the golden samples"""
     title: str = ""
     """Of its files, {} for what they hold (`what_it_is`), where it is another one than of a law alone"""
+    declares_units: bool = False
+    """Whether its files declare units: ``write`` then takes ``linear``, whether the axis moves along a line"""
 
 
 def checked_name(name: str) -> str:
@@ -162,10 +163,8 @@ def at_rest(controller: Controller) -> str:
 def laws_of(controller: Controller) -> list[str]:
     """Its laws, a line each."""
     return [
-        ascii_only(
-            "; ".join(
-                [f"{part}: {block.law.title}", *([", ".join(block.law.source)] if block.law.source else [])]
-            )
+        "; ".join(
+            [f"{part}: {block.law.title}", *([", ".join(block.law.source)] if block.law.source else [])]
         )
         for part, block in controller.blocks.items()
     ]

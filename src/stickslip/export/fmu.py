@@ -46,7 +46,7 @@ def variables_of(job: Job) -> list[Variable]:
         *surroundings_read(job),
         Variable("friction_torque", "friction_torque", "output", "N.m", "Positive against positive velocity"),
     ]
-    return numbered([*ports, *law_variables(job)])
+    return numbered([*ports, *law_variables(job)], job.linear)
 
 
 def write(job: Job) -> Export:

@@ -56,8 +56,8 @@ def variables_of(job: Job) -> list[Variable]:
         [
             Variable("torque", "torque", "input", "N.m", "Torque of the drive, held over a step", 0.0),
             *around,
-            Variable("position", "motion.position", "output", "rad", "Angle of the axis"),
-            Variable("velocity", "motion.velocity", "output", "rad/s", "Angular velocity of the axis"),
+            Variable("position", "motion.position", "output", "rad", "Position of the axis"),
+            Variable("velocity", "motion.velocity", "output", "rad/s", "Velocity of the axis"),
             Variable(
                 "friction_torque", "friction_torque", "output", "N.m", "Positive against positive velocity"
             ),
@@ -66,17 +66,18 @@ def variables_of(job: Job) -> list[Variable]:
                 "axis.inertia",
                 "parameter",
                 "kg.m2",
-                "Moment of inertia",
+                "Inertia of the axis",
                 inertia_of(job),
                 positive=True,
             ),
-            Variable("start_position", "start_position", "parameter", "rad", "Angle at the start", 0.0),
+            Variable("start_position", "start_position", "parameter", "rad", "Position at the start", 0.0),
             Variable("start_velocity", "start_velocity", "parameter", "rad/s", "Velocity at the start", 0.0),
             Variable(
                 "max_step", "max_step", "parameter", "s", "Longest part of a step", MAX_STEP, positive=True
             ),
             *law_variables(job),
-        ]
+        ],
+        job.linear,
     )
 
 

@@ -46,7 +46,7 @@ UNLIMITED = 1e308
 """N·m: stands for no limit, as the files of a unit know no infinite number."""
 
 
-def variables_of(controller: Controller) -> list[Variable]:
+def variables_of(controller: Controller, linear: bool) -> list[Variable]:
     """Inputs, output, parameters and state."""
     limit = min(controller.torque_limit, UNLIMITED)
     counts = counts_of(controller)
@@ -60,7 +60,8 @@ def variables_of(controller: Controller) -> list[Variable]:
                 "torque_limit", "n.torque_limit", "parameter", "N.m", "Largest torque", limit, positive=True
             ),
             *field_variables(controller.fields, controller.values(), controller.state_fields, sizes, ""),
-        ]
+        ],
+        linear,
     )
 
 
@@ -78,13 +79,20 @@ def surroundings_read(controller: Controller) -> Iterable[Variable]:
             )
 
 
-def write(controller: Controller, name: str, single: bool = False, around: Surroundings = STILL) -> Export:
+def write(
+    controller: Controller,
+    name: str,
+    single: bool = False,
+    around: Surroundings = STILL,
+    linear: bool = False,
+) -> Export:
     """A unit of each version, golden samples, and how to use them."""
     c = c99_controller.write(controller, name, around=around).files
-    variables, values = variables_of(controller), controller.values()
+    variables, values = variables_of(controller, linear), controller.values()
     contents = Contents(
         name, "Sampled controller", {f: str(c[f]) for f in (f"{name}.c", f"{name}.h")},
         wholes_of(controller.fields, values), ", ".join(f.name for f in controller.fields if f.par.shares),
+        linear=linear,
     )  # fmt: skip
     files, notes = units_of(
         contents, "fmu_controller.c.j2", variables, f"Sampled {what_it_is(controller)} of a servo axis", slope=None,
@@ -125,4 +133,6 @@ def check(export: Export, name: str) -> Check:
     return checked(export, time, dt, given, {"torque": expected})
 
 
-CONTROLLER = ControllerTarget(write, check, "FMI 2.0 and 3.0 co-simulation unit of a sampled {}")
+CONTROLLER = ControllerTarget(
+    write, check, "FMI 2.0 and 3.0 co-simulation unit of a sampled {}", declares_units=True
+)

@@ -7,10 +7,9 @@ this law since Isaac Sim 5.0 (PxJointFrictionParams). In earlier versions ``fric
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
-from stickslip.export._text import render
+from stickslip.export._text import quoted, render
 from stickslip.export.job import Export, Job
 from stickslip.export.nearest import COULOMB, STATIC, carried
 from stickslip.export.target import Setting, Target, settings_of
@@ -25,8 +24,8 @@ def write(job: Job) -> Export:
     settings = settings_of(TARGET, job.settings)
     notes = (NOTE, *found.notes)
     values: dict[str, Any] = {
-        "x": job.name, "law": job.model.law, "group": json.dumps(settings["group"]),
-        "joints": json.dumps(settings["joints"]), "friction": repr(p.get("fs", p["fc"])), "dynamic": repr(p["fc"]),
+        "x": job.name, "law": job.model.law, "group": quoted(settings["group"]),
+        "joints": quoted(settings["joints"]), "friction": repr(p.get("fs", p["fc"])), "dynamic": repr(p["fc"]),
         "viscous": repr(p["sigma2"]), "notes": notes,
     }  # fmt: skip
     files = {

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from stickslip.errors import InputError
+from stickslip.export._text import folded
 from stickslip.model import Model
 
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")
@@ -34,7 +35,9 @@ class Job:
     top_speed : float or None
         Greatest velocity of the application, rad/s: up to it sliding curves are compared and tables made. None: 100
         times the velocity over which the law changes: that of its `velocity_scale`, or, of a law that does not tell
-        it, the fastest at which its sliding curve bends.
+        it, the fastest at which its sliding curve bends; at least 1 rad/s where that may be the width of a smooth sign.
+    linear : bool
+        The axis moves along a line: numbers are in N, m and kg.
     settings : mapping
         Values of the target's own settings by name (`Target.settings`); what is not given has the default.
     """
@@ -44,6 +47,7 @@ class Job:
     single: bool = False
     nearest: bool = False
     top_speed: float | None = None
+    linear: bool = False
     settings: Mapping[str, str | float] = field(default_factory=dict[str, str | float])
 
     def __post_init__(self) -> None:
@@ -69,11 +73,14 @@ class Export:
     ----------
     files : mapping of str to str or bytes
     notes : tuple of str
-        What the target does not hold, and by how much it differs.
+        What the target does not hold, and by how much it differs; each is one printable line.
     """
 
     files: Mapping[str, str | bytes]
     notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "notes", tuple(map(folded, self.notes)))
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from typing import Any
 from stickslip.export import c99
 from stickslip.export._c import KEYWORDS
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import ascii_only, render
+from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target
 
@@ -42,7 +42,7 @@ def write(job: Job) -> Export:
     code = dict(c99.write(inner).files)
     del code["README.md"]
     values: dict[str, Any] = {
-        "x": job.name, "law": inner.name, "title": ascii_only(job.model.law.title).replace('"', "'"),
+        "x": job.name, "law": inner.name, "title": job.model.law.title,
         "hal": job.name.replace("_", "-"), "note": NOTE,
     }  # fmt: skip
     files = {f"{job.name}.comp": render("linuxcnc.comp.j2", **values), **code}

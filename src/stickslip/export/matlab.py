@@ -8,13 +8,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from stickslip.export._guard import guarded
 from stickslip.export._matlab import functions, local, safe, with_helpers
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import ascii_only, render, summary
+from stickslip.export._text import render, summary, text_in
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
-from stickslip.spec import Surroundings
+from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
 BOUND = 1e-12
@@ -37,9 +38,9 @@ def write(job: Job) -> Export:
     for entry in ("step", "steady"):
         function = getattr(law, entry)
         if function is not None:
-            files[f"{job.name}_{entry}.m"] = _file(
-                job, entry, functions(named({entry: function}, law_layouts(law)))
-            )
+            trees = named({entry: function}, law_layouts(law))
+            trees = guarded(trees, entry) if entry == "step" else trees
+            files[f"{job.name}_{entry}.m"] = _file(job, entry, functions(trees))
     common = {"x": job.name, "law": law, "bound": repr(BOUND), "steady": law.steady is not None}
     return Export(
         {
@@ -61,21 +62,26 @@ def _file(job: Job, entry: str, parts: list[tuple[str, str, list[str]]]) -> str:
     head = lines[0].replace(own, public, 1)
     if entry == "step":  # of every law alike, also of one without memory
         head = head.replace("[torque_]", "[torque_, z]")
-    lines = [head, f"    % {summary(own_name, about)}", f"    % {job.model.law.title}. SI units.", *lines[1:]]
+    lines = [
+        head,
+        comment(summary(own_name, about)),
+        comment(f"{job.model.law.title}. SI units."),
+        *lines[1:],
+    ]
     text = [*lines, ""]
     for name, doc, code in inner:
-        text += [code[0], f"    % {summary(name, doc)}", *code[1:], ""]
+        text += [code[0], comment(summary(name, doc)), *code[1:], ""]
     return "\n".join(with_helpers(text))
 
 
 def _parameters(job: Job) -> Iterable[str]:
     law, p = job.model.law, job.model.parameters
     yield f"function p = {job.name}_parameters()"
-    yield f"    % Identified parameters: {law.title}."
+    yield comment(f"Identified parameters: {law.title}.")
     for f in law.fields:
         value = getattr(p, f.name)
         shown = f"[{', '.join(map(repr, value))}]" if f.per_element else repr(value)
-        yield f"    p.{safe(f.name)} = {shown};  % {f.par.meaning}, {ascii_only(f.par.unit)}"
+        yield f"    p.{safe(f.name)} = {shown};  % {meaning_of(f)}"
     for name, size in counts_in(job.model).items():
         yield f"    p.{name.strip('_')} = {size};"
     yield "end\n"
@@ -88,8 +94,18 @@ def _reset(job: Job) -> Iterable[str]:
     yield "    z = struct();"
     for f in law.state_fields:
         size = f"zeros(1, {law.elements_in(job.model.parameters)})" if f.per_element else "0.0"
-        yield f"    z.{safe(f.name)} = {size};  % {f.par.meaning}, {ascii_only(f.par.unit)}"
+        yield f"    z.{safe(f.name)} = {size};  % {meaning_of(f)}"
     yield "end\n"
+
+
+def comment(text: str) -> str:
+    """A line of a function that is a comment."""
+    return f"    % {text_in('m', text)}"
+
+
+def meaning_of(f: Field) -> str:
+    """The meaning of a field and its unit, for the comment on its line."""
+    return text_in("m", f"{f.par.meaning}, {f.par.unit}")
 
 
 def _surroundings(job: Job) -> Iterable[str]:

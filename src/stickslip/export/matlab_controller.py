@@ -9,7 +9,7 @@ from typing import Any
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.controller import Controller
 from stickslip.export._matlab import functions, local, safe, with_helpers
-from stickslip.export._text import ascii_only, first_line, render, summary
+from stickslip.export._text import first_line, render, summary
 from stickslip.export.controllers import (
     STILL,
     ControllerTarget,
@@ -21,7 +21,7 @@ from stickslip.export.controllers import (
 )
 from stickslip.export.golden import Samples
 from stickslip.export.job import Export
-from stickslip.export.matlab import BOUND, in_octave
+from stickslip.export.matlab import BOUND, comment, in_octave, meaning_of
 from stickslip.spec import Field, Surroundings, fields_of
 
 PUBLIC = ("sample", "follow")
@@ -62,12 +62,12 @@ def entry_of(controller: Controller, entry: str) -> list[str]:
     arguments = lines[0].partition(f"{local(entry)}(")[2]
     out = [
         f"function [torque_, m, z, u] = @({arguments}",
-        f"    % {first_line(about)} SI units.",
+        comment(f"{first_line(about)} SI units."),
         *lines[1:],
         "",
     ]
     for name, doc, code in inner:
-        out += [code[0], f"    % {summary(name, doc)}", *code[1:], ""]
+        out += [code[0], comment(summary(name, doc)), *code[1:], ""]
     return with_helpers(out)
 
 
@@ -79,7 +79,7 @@ def given(
     for f in fields:
         value = values[f.name]
         shown = f"[{', '.join(map(repr, value))}]" if f.per_element else number(value)
-        lines.append(f"    {owner}.{safe(f.name)} = {shown};  % {f.par.meaning}, {ascii_only(f.par.unit)}")
+        lines.append(f"    {owner}.{safe(f.name)} = {shown};  % {meaning_of(f)}")
     return [*lines, *more, "end"]
 
 

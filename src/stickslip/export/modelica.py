@@ -10,7 +10,6 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import math
-import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,9 +18,10 @@ from typing import Any
 import numpy as np
 
 from stickslip.export._analysis import merged
+from stickslip.export._guard import guarded
 from stickslip.export._modelica import KEYWORDS, functions, safe
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import ascii_only, render, sources
+from stickslip.export._text import Code, in_lines, render, sources, text_in
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
@@ -45,19 +45,19 @@ def write(job: Job) -> Export:
     # The public ones first: they have the right to their names.
     entries: dict[str, Any] = {"steady": law.steady} if law.steady else {}
     entries |= {"holding": law.holding} if events else {}
-    trees = merged(named({**entries, "step": law.step}, law_layouts(law)))
+    trees = guarded(merged(named({**entries, "step": law.step}, law_layouts(law))), "step")
     parts = functions(trees, counts_in(job.model))
     heads = {name: lines for name, _, lines in parts}
     values: dict[str, Any] = {
         "x": job.name,
-        "title": ascii_only(law.title).replace('"', "'").replace("\\", "/"),
-        "equation": textwrap.wrap(ascii_only(law.equation), 100, break_long_words=False),
-        "source": ascii_only(sources(law)),
+        "title": law.title,
+        "equation": in_lines(law.equation),
+        "source": sources(law),
         "parameters": [*declared(law.fields, p, law.elements_in(p))],
         "states": [*declared(law.state_fields, None, law.elements_in(p))] or none_taken(heads),
         "around": [f"Real {safe(n)}(start = {v!r}, fixed = true);" for n, v in Surroundings()._asdict().items()],
         "rest": ", ".join(f"{safe(n)} = {v!r}" for n, v in Surroundings()._asdict().items()),
-        "functions": [[ascii_only(line) for line in lines] for _, _, lines in parts],
+        "functions": [[*map(Code, lines)] for _, _, lines in parts],
         "step": called("step", heads["step"], "last, velocity, elapsed, z, p, u"),
         "remembers": takes_state(heads["step"]),
         "holds_state": takes_state(heads.get("holding", ())),
@@ -82,7 +82,7 @@ def takes_state(head: Sequence[str]) -> bool:
 def none_taken(heads: Mapping[str, Sequence[str]]) -> list[str]:
     """The record of a law that remembers nothing, where its functions take one: never assigned, therefore bound."""
     taken = any(" State " in line for lines in heads.values() for line in lines)
-    return ['Real none = 0.0 "this law has none";'] if taken else []
+    return [Code('Real none = 0.0 "this law has none";')] if taken else []
 
 
 def called(name: str, head: Sequence[str], given: str) -> str:
@@ -101,14 +101,14 @@ def declared(fields: Sequence[Field], p: Any, elements: int) -> Iterable[str]:
     for f in fields:
         size = len(getattr(p, f.name)) if p is not None and f.per_element else elements
         array = f"[{size}]" if f.per_element else ""
-        meaning = ascii_only(f"{f.par.meaning}, {f.par.unit}").replace('"', "'").replace("\\", "/")
+        meaning = text_in("mo", f"{f.par.meaning}, {f.par.unit}")
         if p is None:
             each = "each " if f.per_element else ""
-            yield f'Real {safe(f.name)}{array}({each}start = 0.0, {each}fixed = true) "{meaning}";'
+            yield Code(f'Real {safe(f.name)}{array}({each}start = 0.0, {each}fixed = true) "{meaning}";')
             continue
         value = getattr(p, f.name)
         shown = "{" + ", ".join(map(repr, value)) + "}" if f.per_element else repr(value)
-        yield f'Real {safe(f.name)}{array} = {shown} "{meaning}";'
+        yield Code(f'Real {safe(f.name)}{array} = {shown} "{meaning}";')
 
 
 # ---- the check -------------------------------------------------------------------------------------------------

@@ -2,23 +2,36 @@
 
 Coulomb and viscous friction is the joint's ``frictionloss`` and ``damping``; LuGre friction, with a Stribeck shape
 factor of 2, is the ``lugre`` attribute of a passive ``dcmotor`` actuator (MuJoCo 4.0 or later), with ``damping`` for
-the viscous part. The inertia is the joint's ``armature``. Attributes as in MuJoCo's XML reference.
+the viscous part. A difference between the directions is a constant torque: a ``general`` actuator. The inertia is the
+joint's ``armature``. Attributes as in MuJoCo's XML reference.
 """
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.util
 import math
 from typing import Any
 from xml.etree import ElementTree
 
+from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
 from stickslip.export._mujoco_read import Part, joint_named, parts
 from stickslip.export._mujoco_run import drift, pulled, spring
 from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
-from stickslip.export.nearest import COULOMB, Curve, Form, Nearest, bristle_of, carried, fit_stribeck
+from stickslip.export.nearest import (
+    COULOMB,
+    Curve,
+    Form,
+    Nearest,
+    bristle_of,
+    carried,
+    fit_stribeck,
+    parted,
+    with_constant,
+)
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.model import Model
 from stickslip.spec import Surroundings
@@ -65,12 +78,28 @@ LUGRE = Form(
 )
 
 
+@functools.cache
+def _asymmetric() -> tuple[Form, ...]:
+    return tuple(map(with_constant, TARGET.forms))
+
+
+def nearest_to(job: Job) -> Nearest:
+    """What MuJoCo holds of the job's model; a difference between the directions as a constant torque."""
+    return carried(job, TARGET.name, TARGET.forms if job.model.law.odd else (*TARGET.forms, *_asymmetric()))
+
+
 def write(job: Job) -> Export:
     """A model of one joint that runs as it is, and how to use it."""
-    found = carried(job, TARGET.name, TARGET.forms)
+    found = nearest_to(job)
     wanted = settings_of(TARGET, job.settings)
     step, inertia = float(wanted["timestep"]), float(wanted["inertia"])
     model, notes = for_timestep(found, step, inertia, str(wanted["contact"]))
+    if constant := parted(model)[1]:
+        notes = (
+            *notes,
+            f"half of the difference between the directions, {constant:.4g} N·m against positive motion, is a constant "
+            "torque: the `general` actuator gives it, whatever its input; copy it with the joint",
+        )
     text = xml(job, model)
     table = pulled(text, job.model, inertia, step) if importlib.util.find_spec("mujoco") else []
     values: dict[str, Any] = {
@@ -83,12 +112,15 @@ def write(job: Job) -> Export:
 def xml(job: Job, model: Model) -> str:
     """The model's file."""
     wanted = settings_of(TARGET, job.settings)
+    model, constant = parted(model)
     p = model.parameters
     lugre = " ".join(repr(getattr(p, name)) for name in MOTOR) if model.law.name == "lugre" else ""
     return render(
         "mujoco.xml.j2", x=job.name, joint=wanted["joint"], timestep=repr(wanted["timestep"]),
         inertia=repr(wanted["inertia"]), damping=repr(p.sigma2), frictionloss=repr(p.fc), lugre=lugre,
-        stiff=repr(2.0 * float(wanted["timestep"])),
+        constant=repr(-constant) if constant else "", stiff=repr(2.0 * float(wanted["timestep"])),
+        joint_type="slide" if job.linear else "hinge",
+        mass=repr(1e-14 if job.linear else 1e-6),  # of a slide it adds to the armature
     )  # fmt: skip
 
 
@@ -102,7 +134,7 @@ def holding_step(model: Model) -> float:
     """
     if model.law.name != "lugre":
         return math.inf
-    p = model.parameters
+    p = parted(model)[0].parameters
     return (p.sigma1 + p.sigma2) / p.sigma0
 
 
@@ -117,7 +149,7 @@ def for_timestep(found: Nearest, step: float, inertia: float, contact: str) -> t
     model, bound = found.model, holding_step(found.model)
     if step < bound:
         return model, found.notes
-    p = model.parameters
+    p = parted(model)[0].parameters
     soft = min(p.sigma0, inertia / step**2)
     damped = max(p.sigma1, 2.0 * step * soft - p.sigma2)
     if contact == "identified":
@@ -127,7 +159,7 @@ def for_timestep(found: Nearest, step: float, inertia: float, contact: str) -> t
             f"{p.fs / soft:.3g} rad before it breaks away instead of {p.fs / p.sigma0:.3g} rad"
         )
         return model, (*found.notes, warning)
-    softer = Model(model.law, **{**p._asdict(), "sigma0": soft, "sigma1": damped})
+    softer = Model(model.law, **{**model.parameters._asdict(), "sigma0": soft, "sigma1": damped})
     note = (
         f"contact softened to what a timestep of {step:g} s holds at rest: sigma0 {p.sigma0:.4g} to {soft:.4g} "
         f"N·m/rad, sigma1 {p.sigma1:.4g} to {damped:.4g} N·m·s/rad; the sliding curve is as it was"
@@ -168,14 +200,41 @@ def read(text: str, joint: str | None = None) -> Model:
         for m in parts(root, "dcmotor")
         if _drives(m, found) and m.attributes.get("lugre")
     ]
+    constants = [m.attributes for m in parts(root, "general") if _drives(m, found) and _is_constant(m)]
     try:
+        constant = -sum(float(a["biasprm"].split()[0]) for a in constants)
         damping = float(found.attributes.get("damping", "0").split()[0])
         if lugre:
             numbers = [float(x) for x in lugre[0].split()]
-            return Model("lugre", sigma2=damping, delta_s=SHAPE, **dict(zip(MOTOR, numbers, strict=True)))
-        return Model("coulomb", fc=float(found.attributes.get("frictionloss", "0")), sigma2=damping)
+            values = dict(zip(MOTOR, numbers, strict=True))
+            return with_difference(Model("lugre", sigma2=damping, delta_s=SHAPE, **values), constant)
+        model = Model("coulomb", fc=float(found.attributes.get("frictionloss", "0")), sigma2=damping)
+        return with_difference(model, constant)
     except (ValueError, IndexError) as error:
         raise InputError(f"joint {found.name!r}: its friction cannot be read ({error})") from None
+
+
+def with_difference(model: Model, constant: float) -> Model:
+    """The law with a constant torque as half the difference between its directions."""
+    if constant == 0.0:
+        return model
+    law, values = model.law.having(symmetry="asymmetric"), model.parameters._asdict()
+    twins = {f.name: values[f.name.removesuffix(NEGATIVE)] for f in law.fields if f.name.endswith(NEGATIVE)}
+    levels = {"fc", "fs"} & values.keys()
+    values |= (
+        twins
+        | {n: values[n] + constant for n in levels}
+        | {n + NEGATIVE: values[n] - constant for n in levels}
+    )
+    return Model(law, **values)
+
+
+def _is_constant(motor: Part) -> bool:
+    """Whether an actuator gives a constant torque, whatever its input."""
+    own = motor.attributes
+    bias = [float(x) for x in own.get("biasprm", "0").split()]
+    gain = [float(x) for x in own.get("gainprm", "1").split()]
+    return own.get("biastype") == "affine" and not any(gain) and not any(bias[1:])
 
 
 def _drives(motor: Part, joint: Part) -> bool:
@@ -194,19 +253,21 @@ def check(job: Job, export: Export) -> Check:
     text = str(export.files[f"{job.name}.xml"])
     loaded = engine.MjModel.from_xml_string(text)
     wanted = settings_of(TARGET, job.settings)
-    found = carried(job, TARGET.name, TARGET.forms)
+    found = nearest_to(job)
     model, _ = for_timestep(
         found, float(wanted["timestep"]), float(wanted["inertia"]), str(wanted["contact"])
     )
+    model, constant = parted(model)
     p = model.parameters
     pairs = [(loaded.dof_damping[0], p.sigma2), (loaded.dof_armature[0], float(wanted["inertia"]))]
     if model.law.name == "lugre":
-        again = read(text).parameters
+        again = parted(read(text))[0].parameters
         pairs += [(getattr(again, name), getattr(p, name)) for name in MOTOR]
     else:
         pairs.append((loaded.dof_frictionloss[0], p.fc))
+    pairs += [(loaded.actuator_biasprm[-1][0], -constant)] if constant else []
     error = max(abs(float(a) - b) for a, b in pairs)
-    creep = drift(loaded, 0.5 * p.fc)
+    creep = drift(loaded, 0.5 * p.fc + constant)
     said = f"MuJoCo reads it {error:.3g} off; half of the Coulomb torque moves it by {creep:.3g} rad in 1 s"
     return Check(error == 0.0, said, {"mujoco": error, "drift": creep})
 

@@ -21,6 +21,7 @@ from stickslip.binding import NEGATIVE
 from stickslip.errors import ParameterError
 from stickslip.export._analysis import fields_read
 from stickslip.export._sliding import Curve
+from stickslip.export._text import folded
 from stickslip.export.job import CannotCarry, Job
 from stickslip.model import Model
 from stickslip.spec import Bristle, Law, Mode
@@ -28,6 +29,8 @@ from stickslip.subset import law_layouts, named
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+DIFFERENCE = "the difference between the directions"
+CHANGE = "the change of the difference between the directions with the velocity"
 EXACT = 1e-9
 """Of the largest torque: what differs by less is the same."""
 DEPENDENCES = {
@@ -55,8 +58,8 @@ class Form:
         ``fit(curve)``: values of that law's parameters, nearest to a sliding curve.
     keeps : frozenset of str
         What it holds besides a symmetric sliding curve and the torque at rest: "memory", "bristle" (the memory of a
-        law that is one bristle, and of no other), "slope" (through rest), "direction", "position", "load",
-        "temperature", "time".
+        law that is one bristle, and of no other), "slope" (through rest), "direction", "constant" (a difference between
+        the directions that is the same at all velocities), "position", "load", "temperature", "time".
     density : int
         How close the velocities must lie at which it is compared (`Curve`).
     tolerance : float
@@ -75,8 +78,12 @@ class Form:
 
 
 def fit_coulomb(curve: Curve) -> dict[str, float]:
-    """Coulomb and viscous friction: least squares with velocities weighted evenly, neither below 0."""
-    (fc, sigma2), _ = _not_negative([np.ones_like(curve.velocity), curve.velocity], curve.mean, curve.width)
+    """Coulomb and viscous friction: least squares with velocities weighted evenly, neither below 0.
+
+    The slope of a smooth sign is left out: the jump of Coulomb friction is in its place.
+    """
+    weight = curve.width * curve.sliding
+    (fc, sigma2), _ = _not_negative([np.ones_like(curve.velocity), curve.velocity], curve.mean, weight)
     return {"fc": fc, "sigma2": sigma2}
 
 
@@ -132,6 +139,47 @@ def _not_negative(columns: Sequence[Array], target: Array, weight: Array) -> tup
 COULOMB = Form("Coulomb and viscous friction", "coulomb", fit_coulomb)
 STATIC = Form("static, Coulomb and viscous friction", "static", fit_static)
 STRIBECK = Form("Stribeck and viscous friction", "stribeck_plain", fit_stribeck)
+
+
+def with_constant(form: Form) -> Form:
+    """The form of a target that holds a constant torque too: half the difference between the directions."""
+    law = plugins.law(form.law) if isinstance(form.law, str) else form.law
+    law = law.having(symmetry="asymmetric")
+    twins = {f.name: f.name.removesuffix(NEGATIVE) for f in law.fields if f.name.endswith(NEGATIVE)}
+
+    def fit(curve: Curve) -> dict[str, Any]:
+        values, constant = dict(form.fit(curve)), constant_of(curve)
+        values |= {name: values[own] for name, own in twins.items() if own in values}
+        for level in ("fc", "fs"):
+            if level in values:
+                values |= {level: values[level] + constant, level + NEGATIVE: values[level] - constant}
+        return values
+
+    fixed = {**form.fixed, **{name: form.fixed[own] for name, own in twins.items() if own in form.fixed}}
+    return replace(
+        form, words=f"{form.words} and a constant torque", law=law, fit=fit, keeps=form.keeps | {"constant"},
+        fixed=fixed,
+    )  # fmt: skip
+
+
+def constant_of(curve: Curve) -> float:
+    """Half the mean difference between the directions, N·m: positive where positive motion meets more friction."""
+    return 0.5 * float(np.sum(curve.width * (curve.forward - curve.backward)))
+
+
+def parted(model: Model) -> tuple[Model, float]:
+    """A law with other parameters for v < 0 as the mean of both directions and a constant torque, N·m."""
+    law, p = model.law, model.parameters
+    if law.chosen.get("symmetry") != "asymmetric":
+        return model, 0.0
+    constant = 0.5 * (p.fc - getattr(p, "fc" + NEGATIVE))
+    return Model(law.having(symmetry="symmetric"), **mean_of(model)._asdict()), constant
+
+
+def mean_of(model: Model) -> Any:
+    """Parameters of a law with others for v < 0: the mean of both directions."""
+    law, both = model.law.having(symmetry="symmetric"), model.parameters._asdict()
+    return law.parameters({f.name: between(both[f.name], both.get(f.name + NEGATIVE)) for f in law.fields})
 
 
 # ---- what is lost ----------------------------------------------------------------------------------------------
@@ -256,7 +304,8 @@ def curve_of(job: Job) -> Curve:
 
 def nearest(curve: Curve, form: Form) -> Nearest | None:
     """The nearest model of a form, or None where the form has no such parameters."""
-    same = _made(form, _same_names(curve, form))
+    uneven = "constant" in form.keeps and difference_beyond(curve, form) > EXACT * curve.size
+    same = None if uneven else _made(form, _same_names(curve, form))
     as_it_is = _compared(curve, same, form) if same else None
     if as_it_is is not None and as_it_is.residual <= EXACT * curve.size:
         return as_it_is
@@ -295,7 +344,7 @@ def _compared(curve: Curve, model: Model, form: Form) -> Nearest:
     shape = float(np.max(np.abs(other.mean - curve.mean)))
     if shape > form.tolerance * curve.size:
         lost.append("the shape of its sliding curve")
-    elif at_rest > form.tolerance * curve.size and "the difference between the directions" not in lost:
+    elif at_rest > form.tolerance * curve.size and not set(lost) & {DIFFERENCE, CHANGE}:
         lost.append("its torque at rest")
     return Nearest(form, model, tuple(lost), residual, at, at_rest, rms, curve.size, curve.top)
 
@@ -311,27 +360,30 @@ def losses(curve: Curve, form: Form) -> list[str]:
         and law.state_fields
         and not ("bristle" in form.keeps and bristle_of(curve))
     ):
-        bends = [f.par.meaning for f in law.state_fields if not isinstance(f.par, Mode)]
+        bends = [folded(f.par.meaning) for f in law.state_fields if not isinstance(f.par, Mode)]
         memory = "; non-local memory" if law.non_local_memory else ""
         out.append(f"pre-sliding and hysteresis ({', '.join(bends[:3]) or 'its states'}{memory})")
     if "slope" not in form.keeps and curve.slowest > 0.0:
         out.append(f"its slope or band of rest up to {curve.slowest:.2g} rad/s")
-    unequal = float(np.max(np.abs(curve.forward - curve.backward)))
-    if (
-        "direction" not in form.keeps
-        and max(unequal, abs(curve.rest[0] - curve.rest[1])) > EXACT * curve.size
-    ):
-        out.append("the difference between the directions")
+    if "direction" not in form.keeps and difference_beyond(curve, form) > EXACT * curve.size:
+        out.append(CHANGE if "constant" in form.keeps else DIFFERENCE)
     read = surroundings_of(curve.given)
     return out + [words for name, words in DEPENDENCES.items() if name in read and name not in form.keeps]
 
 
+def difference_beyond(curve: Curve, form: Form) -> float:
+    """The largest difference between the directions, without the constant part where the form holds it, N·m."""
+    constant = 2.0 * constant_of(curve) if "constant" in form.keeps else 0.0
+    unequal = np.abs(curve.forward - curve.backward - constant)
+    return max(float(np.max(unequal)), abs(curve.rest[0] - curve.rest[1] - constant))
+
+
 def bristle_of(curve: Curve) -> Bristle | None:
     """The law's bristle where it is one like LuGre's, the dependences on direction and surroundings aside."""
-    law, p = curve.model.law, curve.model.parameters
+    model = curve.model
+    law, p = model.law, model.parameters
     if law.chosen.get("symmetry") == "asymmetric":
-        law, both = law.having(symmetry="symmetric"), p._asdict()
-        p = law.parameters({f.name: between(both[f.name], both.get(f.name + NEGATIVE)) for f in law.fields})
+        law, p = law.having(symmetry="symmetric"), mean_of(model)
     contact = law.modes(p) if law.modes else None
     return contact if isinstance(contact, Bristle) and not contact.own_growth else None
 

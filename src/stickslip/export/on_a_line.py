@@ -1,4 +1,8 @@
-"""Exports of a linear axis: targets write N·m, rad and kg·m², whatever the axis; along a line these are N, m and kg."""
+"""Exports of a linear axis: what targets write in N·m, rad and kg·m² is in N, m and kg for an axis along a line.
+
+Numbers stay as they are. Files with declared units (FMI) and with joint types (MJCF, URDF) are written for the axis by
+their targets (`Job.linear`); here the units in the words of all other files follow.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,10 @@ from collections.abc import Mapping
 from stickslip.export.job import Check, Export
 from stickslip.identify.on_a_line import UNITS, words
 
-WORDED = ("c99", "arduino", "python", "matlab", "st", "linuxcnc")
-"""Targets whose files have units in comments and words alone: others declare units that simulators compute with."""
 TURN = "the axis is linear: a turn in these files stands for 2π m"
+STANDS_FOR = "the axis is linear: N·m, rad and kg·m² in these files stand for N, m and kg"
+ROTARY_ONLY = ("bam",)
+"""Targets whose actuators turn: their numbers keep the meaning that the target gives them."""
 VECTORS = ".csv"
 """Golden vectors keep the names of their columns, by which programs find them."""
 
@@ -20,14 +25,13 @@ def is_linear(content: Mapping[str, object]) -> bool:
 
 
 def along_a_line(export: Export, target: str, own: str) -> Export:
-    """The same files with the units of a linear axis in their words; or a note where the target has its own units, or
-    the export's `own` name is that of a unit."""
+    """The same files with the units of a linear axis in their words; or a note where the target knows rotary actuators
+    only, or the export's `own` name is that of a unit."""
     notes = tuple(words(note) for note in export.notes)
-    if target not in WORDED or UNITS.fullmatch(own):
-        said = "the axis is linear: N·m, rad and kg·m² in these files stand for N, m and kg"
-        return Export(export.files, (*notes, said))
+    if target in ROTARY_ONLY or UNITS.fullmatch(own):
+        return Export(export.files, (*notes, STANDS_FOR))
     files = {name: _text(name, content) for name, content in export.files.items()}
-    turns = any("turn" in content for content in files.values() if isinstance(content, str))
+    turns = any("whole turns" in content for content in files.values() if isinstance(content, str))
     return Export(files, (*notes, TURN) if turns else notes)
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.export._text import text_in
 from stickslip.export.job import Export
 from stickslip.machines.position_map import PositionMap
 
@@ -79,9 +80,9 @@ def c_table(found: PositionMap, name: str = "cogging", points: int = 1024) -> Ex
     whole, scale = _steps(values, WORD)
     left = _left(found, whole * scale, held=False)
     rows = _rows(whole)
-    unit = _ascii(found.unit)
+    unit = text_in("c", found.unit)
     text = f"""/* Torque over the angle, the same in both directions: what the drive must give, {unit}.
- * {_ascii(str(left))}. */
+ * {text_in("c", str(left))}. */
 #ifndef {name.upper()}_H
 #define {name.upper()}_H
 
@@ -168,7 +169,7 @@ def odrive(found: PositionMap, name: str = "odrive_cogging_map") -> Export:
     rows = "\n".join(
         "    " + ", ".join(_float(x) for x in values[i : i + 8]) + "," for i in range(0, ODRIVE, 8)
     )
-    text = f"/* {_ascii(str(left))}. */\nstatic const float cogging_map[{ODRIVE}] = {{\n{rows}\n}};\n"
+    text = f"/* {text_in('c', str(left))}. */\nstatic const float cogging_map[{ODRIVE}] = {{\n{rows}\n}};\n"
     return Export({f"{name}.h": text}, (left.sentence,))
 
 
@@ -198,7 +199,7 @@ def vesc(found: PositionMap, name: str = "cogging") -> Export:
     left = _left(found, whole * scale, held=False)
     data = whole.astype(">i2").tobytes()
     rows = "\n".join("    " + " ".join(str(x) for x in data[i : i + 24]) for i in range(0, len(data), 24))
-    text = f"""; {_ascii(str(left))}.
+    text = f"""; {text_in("c", str(left))}.
 ; Add ({name}-at (get-encoder)) to the current that your program commands, A.
 
 (def {name}-points {VESC})
@@ -281,7 +282,3 @@ def _rows(whole: Array) -> str:
 def _float(value: float) -> str:
     text = f"{float(value):.9g}"
     return f"{text}f" if any(c in text for c in ".en") else f"{text}.0f"
-
-
-def _ascii(text: str) -> str:
-    return text.replace("·", "*")

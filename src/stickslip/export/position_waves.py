@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from stickslip.errors import InputError
-from stickslip.export._text import ascii_only
+from stickslip.export._text import text_in
 from stickslip.export.job import Export
 from stickslip.export.position_tables import left_of, whole_turn
 from stickslip.machines.position_map import PositionMap
@@ -89,12 +89,12 @@ def linuxcnc_waves(found: PositionMap, name: str = "cogging") -> Export:
         As `st_function`.
     """
     note = _checked(found, "linuxcnc")
-    unit = ascii_only(found.unit)
+    unit = text_in("comp", found.unit)
     sums = "\n".join(
         f"    total += {c:.17g} * cos({n:.17g} * angle) + {s:.17g} * sin({n:.17g} * angle);"
         for n, c, s in _waves(found)
     )
-    code = f"""/* {ascii_only(note)} */
+    code = f"""/* {text_in("c", note)} */
 static double {name}_map(double angle) /* rad; {unit} */
 {{
     double total = 0.0;
@@ -104,7 +104,7 @@ static double {name}_map(double angle) /* rad; {unit} */
 """
     component = f"""component {name} "torque over the angle, the same in both directions, for feedforward";
 description \"\"\"
-What the drive must give at the angle that it is told, in {unit} times output-scale. {ascii_only(note)}
+What the drive must give at the angle that it is told, in {unit} times output-scale. {text_in("comp", note)}
 \"\"\";
 pin in float position "position, times position-scale in rad, 0 where the map has 0";
 pin in bit enable = 1 "while 0 the output is 0";
@@ -141,8 +141,8 @@ def _waves(found: PositionMap) -> Iterator[tuple[float, float, float]]:
 
 
 def _st_head(found: PositionMap, name: str, note: str) -> str:
-    return f"""(* {ascii_only(note)} *)
-FUNCTION {name} : LREAL (* {ascii_only(found.unit)} *)
+    return f"""(* {text_in("TcPOU", note)} *)
+FUNCTION {name} : LREAL (* {text_in("TcPOU", found.unit)} *)
 VAR_INPUT
     angle : LREAL; (* rad, 0 where the map has 0 *)
 END_VAR

@@ -12,8 +12,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from stickslip.export._guard import guarded
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import render, sources
+from stickslip.export._text import Code, render, sources
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
@@ -26,7 +27,8 @@ SUBSTEPS = "`contact.step(v0, v1, dt, substeps=4)` divides a step, the velocity 
 def write(job: Job) -> Export:
     """One module, golden vectors, and how to use it."""
     law, p = job.model.law, job.model.parameters
-    trees = named({"step": law.step, **({"steady": law.steady} if law.steady else {})}, law_layouts(law))
+    entries = {"step": law.step, **({"steady": law.steady} if law.steady else {})}
+    trees = guarded(named(entries, law_layouts(law)), "step")
     for tree in trees.values():
         count_by_constant(tree, counts_in(job.model))
         indent_docstring(tree)
@@ -39,7 +41,7 @@ def write(job: Job) -> Export:
         parameters=[*assigned(law.fields, p._asdict())],
         states=[*cleared(law.state_fields)],
         around=[f"{name}={value!r}" for name, value in Surroundings()._asdict().items()],
-        functions=[ast.unparse(tree) for tree in trees.values()],
+        functions=[Code(ast.unparse(tree)) for tree in trees.values()],
         steady=law.steady is not None,
     )
     files = {f"{job.name}.py": text, "golden.csv": as_csv(golden_around(job.model, PACE))}

@@ -6,7 +6,7 @@ import ast
 
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.controller import Controller
-from stickslip.export._text import render
+from stickslip.export._text import Code, render
 from stickslip.export.controllers import (
     STILL,
     ControllerTarget,
@@ -39,7 +39,7 @@ def write(controller: Controller, name: str, single: bool = False, around: Surro
         states=[*cleared(controller.state_fields)],
         memory=[*cleared(MEMORY)],
         around=[f"{n}={value!r}" for n, value in around._asdict().items()],
-        functions=[ast.unparse(tree) for tree in trees.values()],
+        functions=[Code(ast.unparse(tree)) for tree in trees.values()],
         **common,
     )
     return Export(

@@ -8,10 +8,9 @@ into the points.
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
-from stickslip.export._text import render
+from stickslip.export._text import Code, quoted, render
 from stickslip.export.job import Export, Job
 from stickslip.export.nearest import COULOMB, carried
 from stickslip.export.target import Setting, Target, settings_of
@@ -26,14 +25,16 @@ def write(job: Job) -> Export:
     settings = settings_of(TARGET, job.settings)
     notes = (NOTE, *found.notes)
     values: dict[str, Any] = {
-        "x": job.name, "law": job.model.law, "joint": json.dumps(settings["joint"]),
-        "controller": json.dumps(settings["controller"]), "coulomb": repr(p.fc), "viscous": repr(p.sigma2),
+        "x": job.name, "law": job.model.law, "joint": quoted(settings["joint"]),
+        "controller": quoted(settings["controller"]), "coulomb": repr(p.fc), "viscous": repr(p.sigma2),
         "notes": notes,
     }  # fmt: skip
     return Export(
         {
             f"{job.name}.yaml": render("ros.yaml.j2", **values),
-            f"{job.name}_effort.py": render("ros_effort.py.j2", **values),
+            f"{job.name}_effort.py": render(
+                "ros_effort.py.j2", **{**values, "joint": Code(repr(settings["joint"]))}
+            ),
             "README.md": render("ros_readme.md.j2", **values),
         },
         notes,

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from stickslip.export._guard import guarded
 from stickslip.export._hoist import hoisted
 from stickslip.export._st import Names, functions, number
 from stickslip.export._st_names import RESERVED, named_in_st, renamed
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import ascii_only, render, sources, summary
+from stickslip.export._text import Code, in_lines, render, sources, summary, text_in
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Export, Job, counts_in
 from stickslip.export.target import Target
@@ -50,7 +50,7 @@ def write(job: Job) -> Export:
     law, p = job.model.law, job.model.parameters
     x = named_in_st([job.name], RESERVED | set(BLOCK))[job.name]
     counts = counts_in(job.model)
-    trees = hoisted(named({"_step": law.step}, law_layouts(law)))
+    trees = hoisted(guarded(named({"_step": law.step}, law_layouts(law))))
     fields = [f.name for f in (*law.fields, *law.state_fields)]
     names = Names.of(trees, x, [*fields, *Surroundings._fields])
     word = names.words
@@ -59,9 +59,9 @@ def write(job: Job) -> Export:
     values: dict[str, Any] = {
         "x": x,
         "file": f"{job.name}.st",
-        "title": ascii_only(law.title),
-        "equation": textwrap.wrap(ascii_only(law.equation), 110, break_long_words=False),
-        "source": ascii_only(sources(law)),
+        "title": law.title,
+        "equation": in_lines(law.equation),
+        "source": sources(law),
         "parameters": [*declared(law.fields, p._asdict(), counts, word)],
         "states": [*declared(law.state_fields, {}, counts, word)],
         "around": around,
@@ -101,7 +101,8 @@ def declared(
         if values:
             value = values[f.name]
             start = f" := [{', '.join(map(number, value))}]" if f.per_element else f" := {number(value)}"
-        yield f"{word[f.name]} : {kind}{start}; (* {ascii_only(f'{f.par.meaning}, {f.par.unit}')} *)"
+        meaning = text_in("st", f"{f.par.meaning}, {f.par.unit}")
+        yield Code(f"{word[f.name]} : {kind}{start}; (* {meaning} *)")
     if not fields:
         yield "none : LREAL;"
 

@@ -29,7 +29,7 @@ def write(job: Job) -> Export:
     joint = settings_of(TARGET, job.settings)["joint"]
     values: dict[str, Any] = {
         "x": job.name, "joint": joint, "friction": repr(p.fc), "damping": repr(p.sigma2), "law": job.model.law,
-        "notes": found.notes,
+        "notes": found.notes, "joint_type": "prismatic" if job.linear else "continuous",
     }  # fmt: skip
     files = {
         f"{job.name}.urdf": render("urdf.urdf.j2", **values),

@@ -11,7 +11,7 @@ from stickslip.identify.estimate import Identification, Picture
 from stickslip.machines.servo import ServoAxis
 
 LINEAR = ServoAxis(motion="linear")
-UNITS = re.compile(r"(?<![A-Za-z0-9_.])([mµk]?)(N[·*]m|kg[·*]m(?:²|\^2)|rad)(?![A-Za-z0-9_]|\.[A-Za-z])")
+UNITS = re.compile(r"(?<![A-Za-z0-9_.])([mµk]?)(N[·*.]m|kg[·*.]m(?:²|\^2|2)|rad)(?![A-Za-z0-9_]|\.[A-Za-z])")
 """A unit in a sentence, a label or a comment, perhaps with a prefix, also in ASCII's letters; no part of an identifier
 or of a file's name."""
 ALONG = {"N": "N", "k": "kg", "r": "m"}

@@ -264,7 +264,8 @@ def exported_controller(
     else:
         made, offset = controller_in(source), 0.0
     target = controller_target(chosen.name)
-    files: Export = target.write(made, name, single, surroundings_of(source))
+    units = {"linear": is_linear(content.values)} if target.declares_units else {}
+    files: Export = target.write(made, name, single, surroundings_of(source), **units)
     notes = (*files.notes, *notes_on_controller(content, made, compensator, offset))
     run = target.check if check else None
     attempt: Attempt | None = (lambda made: run(made, name)) if run else None
@@ -384,7 +385,12 @@ def job_of(source: Source, content: Table, name: str, chosen: Target) -> Job:
     """The model, with what the file knows of its axis."""
     known = axis_of(content)
     settings: dict[str, str | float] = {s.name: known[s.name] for s in chosen.settings if s.name in known}
-    return Job(model_of(source, content), name, top_speed=fastest_recorded(content), settings=settings)
+    linear = is_linear(content.values)
+    if linear and any(s.name == "motion" for s in chosen.settings):
+        settings["motion"] = "linear"
+    return Job(
+        model_of(source, content), name, top_speed=fastest_recorded(content), linear=linear, settings=settings
+    )
 
 
 def fastest_recorded(content: Table) -> float | None:

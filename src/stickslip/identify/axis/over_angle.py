@@ -163,7 +163,8 @@ def over_angle(
             "friction)"
         )
     choice = replace(choice, table=(math.inf, math.inf))  # inertia and friction stand beside waves alone
-    the_map = map_of(found, places, "N·m", choice)
+    bounds = float(places.angle.min()), float(places.angle.max())
+    the_map = map_of(found, places, "N·m", choice, bounds)
     even = sum(part == "even" for part, _ in terms)
     notes = (
         f"Torque over the angle: {even} orders in both directions alike, {len(terms) - even} with the direction, "

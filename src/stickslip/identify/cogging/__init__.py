@@ -35,7 +35,7 @@ from stickslip.identify.cogging.result import (
     notes_of,
     pictures_of,
 )
-from stickslip.identify.cogging.rows import FASTEST, Places, joined, places_of, velocity_of
+from stickslip.identify.cogging.rows import FASTEST, Places, bounds_of, joined, places_of, velocity_of
 from stickslip.identify.cogging.table import table_left_out, table_of
 from stickslip.identify.estimate import Identification, silent
 from stickslip.machines.angle import AngleMap
@@ -87,7 +87,7 @@ def identify_cogging(
     progress(f"{len(places)} places, {orders.count} orders")
     found, choice, terms = chosen_terms(places, orders, moving)
     lag, eccentric = lag_of(found), eccentricities(found)
-    the_map = map_of(found, places, unit, choice)
+    the_map = map_of(found, places, unit, choice, bounds_of(places, records))
     notes = notes_of(the_map, found, orders, choice, lag, eccentric, places)
     motions: list[Motion] = []
     for i, record in enumerate(records):
@@ -155,7 +155,7 @@ def chosen_terms(places: Places, orders: Orders, moving: Sequence[str]) -> tuple
     return fit(places, terms, moving), choice, terms
 
 
-def map_of(found: Fit, places: Places, unit: str, choice: Choice) -> PositionMap:
+def map_of(found: Fit, places: Places, unit: str, choice: Choice, bounds: tuple[float, float]) -> PositionMap:
     """Harmonics; the table too, where it is the better one."""
 
     def waves(part: str) -> Waves:
@@ -165,7 +165,7 @@ def map_of(found: Fit, places: Places, unit: str, choice: Choice) -> PositionMap
             tuple(t[1] for t in own), tuple(float(p[0]) for p in pairs), tuple(float(p[1]) for p in pairs)
         )
 
-    low, high = float(places.angle.min()), float(places.angle.max())
+    low, high = bounds
     table: tuple[float, ...] = ()
     odd: tuple[float, ...] = ()
     offset, friction = float(found.values[0]), float(found.values[1])

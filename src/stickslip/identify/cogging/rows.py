@@ -36,6 +36,8 @@ PART = 16
 """Of a stroke, over which velocity is averaged on each side: friction lags behind faster changes."""
 WINDOW = 0.01
 """s, over which a velocity is taken on each side."""
+CLOSED = 1.5
+"""Widest gap between the last angle of a turn and the first, in median spacings: places scatter by half of one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +164,22 @@ def joined(parts: Sequence[Places]) -> Places:
         count += int(p.stroke.max(initial=-1)) + 1
         late = float(out[-1].time.max(initial=late))
     return Places(*(np.concatenate([getattr(p, n) for p in out]) for n in Places.__dataclass_fields__))
+
+
+def bounds_of(places: Places, records: Sequence[Record]) -> tuple[float, float]:
+    """Smallest and largest angle of a map, rad; a whole turn apart if its last place is the neighbour of its first.
+
+    The rows that are left out about a turn-round count: the axis was there, and harmonics go on over their width.
+    """
+    low, high = float(places.angle.min()), float(places.angle.max())
+    about = AFTER[0] + 3.0 * places.spacing
+    for angle in (r["position"] for r in records):
+        low = min(low, max(float(np.nanmin(angle)), low - about))
+        high = max(high, min(float(np.nanmax(angle)), high + about))
+    turn = 2.0 * math.pi
+    if 0.0 < low + turn - high <= CLOSED * places.spacing < 0.5 * turn:
+        high = low + turn
+    return low, high
 
 
 # ---- standstill ------------------------------------------------------------------------------------------------------
