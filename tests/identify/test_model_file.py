@@ -76,5 +76,5 @@ def test_bad_files_get_one_line(tmp_path, text, complaint):
 
 
 def test_an_unwritable_place_is_told(tmp_path):
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="cannot write"):
         write_model(tmp_path / "none" / "model.toml", found(Model("coulomb", fc=1.0)))
