@@ -228,7 +228,9 @@ def sliding_points(
         dropped += [d for d in (*left, *stood) if _worth_naming(d, slid)]
         stuck += sticking
     if not segments:
-        raise InputError(_none_found(dropped))
+        integrated = all("position" in r.meta.get("derived", {}) for r in several)
+        table = "; of a table of steady points leave times and --sample-time out" if integrated else ""
+        raise InputError(f"{_none_found(dropped)}{table}")
     std = np.array([s.std for s in segments])
     usable = bool(np.all(np.isfinite(std) & (std > 0.0)))
     largest = max(float(np.max(np.abs(r[torque]))) for r in several)
