@@ -83,8 +83,8 @@ def identify(
         Fitted together; none where arrays are given by name (`t`, `position`, `torque`, ...).
     method : str
         One of `stickslip.identify.methods.METHODS`: "axis" (inertia, offset or gravity and friction jointly, from any
-        motion), "sliding" (constant velocities, or a table of velocity and torque without times), "breakaway" (torque
-        ramps), "presliding" and "attraction" (GMS),
+        motion), "sliding" (constant velocities, a table of velocity and torque without times, or an axis that coasts
+        with its `inertia` given), "breakaway" (torque ramps), "presliding" and "attraction" (GMS),
         "hysteresis" (a measured friction along its motion), "lugre" (sigma0, sigma1), "inertia" (frequency response),
         "cogging" (torque or current over the angle).
     law : str, Law or sequence of these, optional
@@ -170,7 +170,9 @@ def identify(
     )  # fmt: skip
     given = given_in(options, inertia=inertia is not None, loop=bool(loop), hold_out=bool(_listed(hold_out)))
     kind.refuse_unused(given, methods_by_option())
-    examiner = Examiner((*accept, *(["missing-column"] if kind.takes_current else [])), regress, tell)
+    coasting = method == "sliding" and inertia is not None
+    expected = ["missing-column"] if kind.takes_current else ["no-torque"] if coasting else []
+    examiner = Examiner((*accept, *expected), regress, tell)
     sources = sources_of(logs, _listed(hold_out), loop, reading, examiner, steady=kind.takes_steady_points)
     if pendulum:
         sources = [replace(s, findings=with_pendulum(s)) for s in sources]

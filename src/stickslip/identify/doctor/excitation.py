@@ -68,7 +68,7 @@ def moved(view: View) -> Iterator[Finding]:
                 "no-torque",
                 f"{view.torque_channel} is {torque[0]:g} throughout",
                 remedy=f"check that {view.name(view.torque_channel)!r} was logged; if the axis coasts with the drive "
-                "off, log the push before it as well",
+                "off, log the push before it as well, or take --method sliding with --inertia=KGM2",
             )
 
 

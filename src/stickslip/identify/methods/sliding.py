@@ -12,6 +12,7 @@ from stickslip.errors import InputError, UnknownName
 from stickslip.identify.doctor.steady_table import NOTES, is_steady_table
 from stickslip.identify.estimate import Identification
 from stickslip.identify.fit.axis_start import each_way, frozen_by_default, starts
+from stickslip.identify.methods._coasting import coasting_points
 from stickslip.identify.methods._records import has_torque, with_torque
 from stickslip.identify.methods.method import TORQUE, Method, Options, law_of, refuse_unsaid
 from stickslip.identify.sliding.choice import candidates, choose_sliding, comparable
@@ -30,8 +31,7 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     """Fit the laws named, or the curves of the thesis, together with a constant torque; choose one of several."""
     if options.per_direction and not options.laws:
         raise InputError("--method sliding --per-direction needs a law; name one, such as --law coulomb")
-    records, channel = with_torque(records, options, "sliding")
-    measured, notes = points_in(records, channel)
+    measured, notes = measured_points(records, options)
     points = replace(measured, offset=known_offset(measured, options))
     if options.laws:
         laws = [law_of(given) for given in options.laws]
@@ -51,6 +51,21 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
         found = identify_sliding(points, next(iter(templates.values())), noise=options.noise, frozen=frozen)
     said = [PER_DIRECTION] if options.per_direction and "offset" not in options.frozen else []
     return replace(found, notes=(*notes, *said, *found.notes))
+
+
+def measured_points(records: Sequence[Record], options: Options) -> tuple[SlidingPoints, tuple[str, ...]]:
+    """Return velocities and friction torques: of a coasting axis if its inertia is given, else as `points_in`."""
+    inertia = options.values.get("inertia")
+    if inertia is not None:
+        return coasting_points(records, inertia)
+    records, channel = with_torque(records, options, "sliding")
+    return points_in(records, channel)
+
+
+def check(records: Sequence[Record], options: Options) -> None:
+    """Refuse records without a torque, unless the inertia of a coasting axis is given."""
+    if "inertia" not in options.values:
+        has_torque("sliding")(records, options)
 
 
 def points_in(records: Sequence[Record], torque: str) -> tuple[SlidingPoints, tuple[str, ...]]:
@@ -105,7 +120,7 @@ def refuse_unknown(options: Options, templates: Iterable[Model]) -> None:
     UnknownName, InputError
     """
     names = {"offset", *(f.name for model in templates for f in model.law.fields)}
-    for name in (*options.values, *options.frozen):
+    for name in (*(set(options.values) - {"inertia"}), *options.frozen):
         if name.partition("[")[0] not in names:
             raise UnknownName("parameter of --method sliding", name, names)
     for name in options.free:
@@ -123,6 +138,8 @@ def template(law: Law, velocity: Array, torque: Array, options: Options) -> Mode
 
 
 METHOD = Method(
-    "sliding", "sliding curve from constant velocities", identify, has_torque("sliding"),
-    uses=TORQUE | {"laws", "values", "frozen", "free", "noise", "per_direction"}, takes_steady_points=True,
+    "sliding", "sliding curve from constant velocities", identify, check,
+    uses=TORQUE | {"laws", "values", "frozen", "free", "noise", "per_direction", "inertia"},
+    narrowed={"inertia": frozenset({"inertia", "laws", "values", "frozen", "free", "noise", "per_direction"})},
+    takes_steady_points=True,
 )  # fmt: skip
