@@ -45,6 +45,10 @@ CALLS = [
     (["export", "m.toml", "--to", "c99", "--out", "/dev/null"], "/dev/null"),
     (["simulate", RUN, "--out", "/dev/null"], "is not a regular file"),
     (["learn", "sampled.toml", "--out", "folder"], "is a folder"),
+    (["identify", DEMO, "--law", "coulomb", "--out", "a\udcffb"], "is not Unicode"),
+    (["rig", "run", "breakaway", "--rig", "ideal", "--stream", "loop"], "loop"),
+    (["recommend", "m.toml", "--out", "loop"], "loop"),
+    (["export", "m.toml", "--to", "urdf", "--top-speed", "0"], "the top speed is 0 rad/s"),
     (["sweep", "thesis-robustness", "--cases=--"], "--cases=--: -- is no value"),
     (["study", "thesis", "--jobs=--"], "--jobs=--: -- is no value"),
     (["recommend", "m.toml", f"--confirm={DIGITS}"], "--confirm: 99999999999999999999... is too large"),
@@ -65,11 +69,12 @@ def test_an_odd_call_is_one_line(tmp_path, monkeypatch, capsys, words: list[str]
     (tmp_path / "m.toml").write_text('law = "coulomb"\n[parameters]\nfc = 0.3\nsigma2 = 0.01\n')
     (tmp_path / "sampled.toml").write_text(SAMPLED)
     (tmp_path / "folder").mkdir()
+    (tmp_path / "loop").symlink_to("loop")
     assert main(words) == 2
     complaint = capsys.readouterr().err.splitlines()[-1]
     assert said in complaint
     assert len(complaint) < 1200
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "m.toml", "sampled.toml"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "loop", "m.toml", "sampled.toml"]
 
 
 def nested(depth: int) -> list[object]:

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -224,7 +225,7 @@ def writable(out: Path, model: Path) -> None:
     from stickslip.errors import InputError
     from stickslip.whole_files import prepared_folder
 
-    if out.resolve() == model.resolve():
+    if os.path.realpath(out) == os.path.realpath(model):
         raise InputError(f"--out {out} is the model itself; give another name, such as recommended.toml")
     if out.is_dir():
         raise InputError(
