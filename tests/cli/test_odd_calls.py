@@ -47,7 +47,6 @@ CALLS = [
     (["learn", "sampled.toml", "--out", "folder"], "is a folder"),
     (["identify", DEMO, "--law", "coulomb", "--out", "a\udcffb"], "is not Unicode"),
     (["rig", "run", "breakaway", "--rig", "ideal", "--stream", "loop"], "loop"),
-    (["recommend", "m.toml", "--out", "loop"], "loop"),
     (["export", "m.toml", "--to", "urdf", "--top-speed", "0"], "the top speed is 0 rad/s"),
     (["sweep", "thesis-robustness", "--cases=--"], "--cases=--: -- is no value"),
     (["study", "thesis", "--jobs=--"], "--jobs=--: -- is no value"),
@@ -97,6 +96,14 @@ class Unprintable:
 
     def __repr__(self) -> str:
         raise RuntimeError
+
+
+def test_a_key_of_many_parts_is_refused_at_once(tmp_path, capsys) -> None:
+    """The parser of Python takes a minute for this one."""
+    file = tmp_path / "deep.toml"
+    file.write_text(f"a{'.a' * 50_000} = 1\n")
+    assert main(["machine", str(file)]) == 2
+    assert "nested too deeply" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
