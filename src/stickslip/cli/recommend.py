@@ -176,7 +176,7 @@ def run(args: argparse.Namespace) -> int:
             torque_limit=args.torque_limit, motion=args.motion, motion_map=args.motion_map, remember=True,
             amplitude=args.amplitude,
             frequency=args.frequency, inertia=args.inertia, feed_inertia=args.feed_inertia,
-            compensators=[n.strip() for n in args.compensators.split(",")] if args.compensators else (),
+            compensators=[n.strip() for n in args.compensators.split(",")] if args.compensators is not None else (),
             axes=args.axes, confirm=args.confirm, progress=progress,
         )  # fmt: skip
     written, removed = store(args.out, result) if args.out else (None, False)
