@@ -49,6 +49,8 @@ CALLS = [
     (["rig", "run", "breakaway", "--rig", "ideal", "--stream", "loop"], "loop"),
     (["export", "m.toml", "--to", "urdf", "--top-speed", "0"], "the top speed is 0 rad/s"),
     (["identify", DEMO, "--law", "coulomb", "--inverse", "--drive-gain", "1e308"], "times 1e+308"),
+    (["identify", DEMO, DEMO, "--law", "coulomb", "--inverse"], "are the same record"),
+    (["identify", DEMO, "--hold-out", DEMO, "--law", "coulomb", "--inverse"], "are the same record"),
     (["doctor", DEMO, "--rows", "1:99999"], "--rows ends at row 99999, but the record has 6000 rows"),
     (["doctor", DEMO, "--leave-out", "5900:6001"], "--leave-out ends at row 6001, but the record has 6000 rows"),
     (["recommend", "m.toml", "--inertia=4e-4", "--amplitude=0.1", "--frequency=0"], "--frequency 0 must be greater"),

@@ -340,8 +340,8 @@ def _columns(
     with np.errstate(over="ignore", invalid="ignore"):
         if not np.isfinite(torque @ torque):
             raise InputError(
-                f"{experiment.name}: the drive's signal times {gain:.3g} (drive gain, torque constant) is too large to be "
-                "computed with; correct that number or the unit of the signal"
+                f"{experiment.name}: the drive's signal times {gain:.3g} (drive gain, torque constant) is too large to "
+                "be computed with; correct that number or the unit of the signal"
             )
     ahead, back = (v > 0.0).astype(float), (v < 0.0).astype(float)
     columns = [acceleration]
