@@ -91,7 +91,7 @@ DEEP_KEY = re.compile(r"""^\s*\[*(?:[\w"'-]+\s*\.\s*){100}""", re.MULTILINE)
 """A key of over a hundred parts: tomllib takes quadratic time for it, and no file of this package has one"""
 
 
-def toml_in(text: str) -> Table:
+def toml_in(text: str) -> dict[str, Any]:
     """Parse a TOML text.
 
     Raises
