@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -137,6 +138,10 @@ FOUND: list[tuple[Callable[..., Any], str]] = [
      "controller, duration, initial, integrator, metered, output, reference, slip_rule, time_step, tolerance"),
     (lambda: ss.simulate(AXIS, LOOP), "simulate: missing a required argument: 'reference'; its arguments are axis, "
      "controller, reference, duration, integrator, tolerance, time_step, slip_rule, output, initial, metered, check"),
+    (lambda: LAW.sliding_torque({1.0, 2.0}), "Model.sliding_torque: velocity = {1.0, 2.0} must be a number or a list "
+     "of these"),
+    (lambda: replace(LAW.law, check=int), "law: check = <class 'int'> must be a function"),
+    (lambda: LOOP.holding(int), "Controller.holding: change = <class 'int'> must be a function"),
     (lambda: ss.Reference.table(["a", "b"], [0.0, 1.0]), "Reference.table: time[0] = 'a' must be a number"),
 ]  # fmt: skip
 

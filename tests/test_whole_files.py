@@ -49,6 +49,15 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path, name: str) -> None:
     assert {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == before
 
 
+def test_a_full_disk_leaves_no_part_of_an_export(tmp_path: Path) -> None:
+    """The small header fits, the source does not."""
+    made = ss.export(MODEL, "c99")
+    sizes = sorted(len(content) for content in made.files.values())
+    with full_disk((sizes[0] + sizes[-1]) // 2), pytest.raises(ss.InputError, match="cannot write"):
+        made.save(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("words", "file"),
     [

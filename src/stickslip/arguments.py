@@ -108,7 +108,13 @@ def insist_on(owner: str, rules: Mapping[str, Rule], given: Mapping[str, Any]) -
 
 def insist(owner: str, name: str, rule: Rule, value: Any) -> None:
     """As `insist_on`, of one."""
-    if (wrong := rule.wrong(value)) is not None:
+    try:
+        wrong = rule.wrong(value)
+    except BEYOND:
+        raise
+    except Exception:  # the object's own methods fail
+        wrong = Wrong("", value, rule.words)
+    if wrong is not None:
         raise refusal(owner, name, wrong, rule.lists)
 
 

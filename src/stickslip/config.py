@@ -87,6 +87,24 @@ def refuse_endless(path: Path) -> None:
         raise InputError(f"{path} is a pipe or device, not a file; save its content to a file and give that")
 
 
+DEEP_KEY = re.compile(r"""^\s*\[*(?:[\w"'-]+\s*\.\s*){100}""", re.MULTILINE)
+"""A key of over a hundred parts: tomllib takes quadratic time for it, and no file of this package has one"""
+
+
+def toml_in(text: str) -> dict[str, Any]:
+    """Parse a TOML text.
+
+    Raises
+    ------
+    tomllib.TOMLDecodeError
+    RecursionError
+        If a key, an array or a table is nested too deeply.
+    """
+    if DEEP_KEY.search(text):
+        raise RecursionError("a key of more than 100 parts")
+    return tomllib.loads(text)
+
+
 def read_toml(path: Path, name: str = "", moved: Mapping[str, Path] | None = None) -> Table:
     """Read a TOML file.
 
@@ -98,7 +116,7 @@ def read_toml(path: Path, name: str = "", moved: Mapping[str, Path] | None = Non
     shown = name or str(path)
     refuse_endless(path)
     try:
-        values = tomllib.loads(path.read_bytes().decode())
+        values = toml_in(path.read_bytes().decode())
     except FileNotFoundError:
         raise ConfigError(f"no file {shown}; check the path") from None
     except UnicodeDecodeError as error:

@@ -68,7 +68,7 @@ def law(name: str, named_by: str = "") -> Law:
     UnknownName, LawError, CodeRefused
     """
     if name.endswith(".py"):
-        return law_in(*code_at(str(Path(name).resolve()), named_by))
+        return law_in(*code_at(os.path.realpath(name), named_by))
     if name in importlib.import_module("stickslip.laws").LAWS:
         return completed(importlib.import_module(f"stickslip.laws.{name}").LAW).coming_from(law, name)
     if name in (files := _from_files()):
@@ -137,7 +137,7 @@ def installed(group: str) -> Mapping[str, Any]:
 
 def _from_files() -> dict[str, Law]:
     paths = [p for p in os.environ.get("STICKSLIP_LAWS", "").split(os.pathsep) if p]
-    laws = [law_in(*code_at(str(Path(p).resolve()))) for p in paths]
+    laws = [law_in(*code_at(os.path.realpath(p))) for p in paths]
     return {found.name: found for found in laws}
 
 

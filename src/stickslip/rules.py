@@ -135,7 +135,12 @@ def rule_of(hint: Any) -> Rule | None:
         listed = _joined([repr(word) for word in inner])
         return _plain(listed, lambda value: isinstance(value, (str, int)) and value in inner)
     if origin is FUNCTION:
-        return _plain("a function", callable, {types.FunctionType, types.MethodType})
+        # A class makes an object of its own kind instead of what is computed.
+        return _plain(
+            "a function",
+            lambda value: callable(value) and not isinstance(value, type),
+            {types.FunctionType, types.MethodType},
+        )
     kind: Any = origin or hint
     if kind is os.PathLike:
         return _plain(
@@ -226,10 +231,13 @@ def _mapping(key: Rule | None, item: Rule | None) -> Rule:
 def _several(item: Rule | None, iterable: bool) -> Rule:
     """A list, tuple, array, ...; of what may only be gone through once nothing is looked at."""
     words = f"a list{many(item.words) if item else ''}"
+    ordered = not iterable and item is not None and item.make is not None
 
     def wrong(value: Any) -> Wrong | None:
         given = value
         several = hasattr(given, "__iter__") and getattr(given, "ndim", 1) > 0
+        if ordered and not (hasattr(given, "__getitem__") or hasattr(given, "__array__")):
+            several = False  # a set or a view of a mapping, of which NumPy makes no array
         if isinstance(given, (str, bytes, abc.Mapping)) or not (
             several and (iterable or hasattr(given, "__len__"))
         ):

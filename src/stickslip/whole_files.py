@@ -9,8 +9,8 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Generator
-from contextlib import contextmanager, suppress
+from collections.abc import Generator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from stickslip.errors import InputError, unwritable
@@ -67,16 +67,31 @@ def write_whole(target: Path, content: str | bytes, option: str = "--out") -> Pa
     ------
     InputError
     """
+    write_together({target: content}, option)
+    return target
+
+
+def write_together(contents: Mapping[Path, str | bytes], option: str = "--out") -> None:
+    """Write several files as `write_whole` does: all of them or, if one cannot be written, none.
+
+    Raises
+    ------
+    InputError
+    """
+    with ExitStack() as drafts:
+        for target, content in contents.items():
+            data = content if isinstance(content, bytes) else _encoded(content, target)
+            drafts.enter_context(draft_of(target, option)).write_bytes(data)
+
+
+def _encoded(text: str, target: Path) -> bytes:
     try:
-        data = content if isinstance(content, bytes) else content.encode()
+        return text.encode()
     except UnicodeEncodeError as error:
         odd = error.object[error.start : error.end]
         raise InputError(
             f"cannot write {target}: {odd!r} in its text is not Unicode; correct that text"
         ) from None
-    with draft_of(target, option) as draft:
-        draft.write_bytes(data)
-    return target
 
 
 def prepared_folder(folder: Path, option: str = "--out") -> Path:

@@ -45,6 +45,16 @@ CALLS = [
     (["export", "m.toml", "--to", "c99", "--out", "/dev/null"], "/dev/null"),
     (["simulate", RUN, "--out", "/dev/null"], "is not a regular file"),
     (["learn", "sampled.toml", "--out", "folder"], "is a folder"),
+    (["identify", DEMO, "--law", "coulomb", "--out", "a\udcffb"], "is not Unicode"),
+    (["rig", "run", "breakaway", "--rig", "ideal", "--stream", "loop"], "loop"),
+    (["export", "m.toml", "--to", "urdf", "--top-speed", "0"], "the top speed is 0 rad/s"),
+    (["identify", DEMO, "--law", "coulomb", "--inverse", "--drive-gain", "1e308"], "times 1e+308"),
+    (["identify", DEMO, DEMO, "--law", "coulomb", "--inverse"], "are the same record"),
+    (["identify", DEMO, "--hold-out", DEMO, "--law", "coulomb", "--inverse"], "are the same record"),
+    (["doctor", DEMO, "--rows", "1:99999"], "--rows ends at row 99999, but the record has 6000 rows"),
+    (["doctor", DEMO, "--leave-out", "5900:6001"], "--leave-out ends at row 6001, but the record has 6000 rows"),
+    (["recommend", "m.toml", "--inertia=4e-4", "--amplitude=0.1", "--frequency=0"], "--frequency 0 must be greater"),
+    (["recommend", "m.toml", "--compensators="], "unknown compensator ''"),
     (["sweep", "thesis-robustness", "--cases=--"], "--cases=--: -- is no value"),
     (["study", "thesis", "--jobs=--"], "--jobs=--: -- is no value"),
     (["recommend", "m.toml", f"--confirm={DIGITS}"], "--confirm: 99999999999999999999... is too large"),
@@ -65,11 +75,12 @@ def test_an_odd_call_is_one_line(tmp_path, monkeypatch, capsys, words: list[str]
     (tmp_path / "m.toml").write_text('law = "coulomb"\n[parameters]\nfc = 0.3\nsigma2 = 0.01\n')
     (tmp_path / "sampled.toml").write_text(SAMPLED)
     (tmp_path / "folder").mkdir()
+    (tmp_path / "loop").symlink_to("loop")
     assert main(words) == 2
     complaint = capsys.readouterr().err.splitlines()[-1]
     assert said in complaint
     assert len(complaint) < 1200
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "m.toml", "sampled.toml"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "loop", "m.toml", "sampled.toml"]
 
 
 def nested(depth: int) -> list[object]:
@@ -92,6 +103,14 @@ class Unprintable:
 
     def __repr__(self) -> str:
         raise RuntimeError
+
+
+def test_a_key_of_many_parts_is_refused_at_once(tmp_path, capsys) -> None:
+    """The parser of Python takes a minute for this one."""
+    file = tmp_path / "deep.toml"
+    file.write_text(f"a{'.a' * 50_000} = 1\n")
+    assert main(["machine", str(file)]) == 2
+    assert "nested too deeply" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -80,6 +80,8 @@ def test_a_bench_runs_and_goes_on_where_it_was(small, tmp_path):
     third = run_bench(small, out, ["one", "none"], progress=lambda done, of: seen.append((done, of)))
     assert seen == [(2, 2)]
     assert [r.metrics for r in third.runs] == [r.metrics for r in first.runs]
+    run_bench(small, out, ["one", "none"], progress=lambda done, of: seen.append((done, of)))
+    assert seen == [(2, 2)]  # the line after the one cut short is whole
     small.write_text(SMALL.replace("friction = 0.7", "friction = 0.8"))
     changed = run_bench(small, out, ["one", "none"])
     assert changed.runs[0].metrics == first.runs[0].metrics

@@ -229,6 +229,8 @@ def _dispatch(argv: list[str]) -> int:
         raise InputError(f"unknown verb {argv[0]!r}; {suggestion(argv[0], VERBS)}")
     if any("\0" in word for word in argv):
         raise InputError("an argument contains a NUL character, which no name or number has; remove it")
+    if odd := next((word for word in argv if not is_unicode(word)), ""):
+        raise InputError(f"the argument {odd!r} is not Unicode; rename the file or folder in UTF-8")
     if odd := next((word for word in argv if OPTION.match(word) and word.partition("=")[2] == "--"), ""):
         # argparse drops these two dashes and hands an empty list to the verb.
         raise InputError(f"{odd}: -- is no value; give one, or leave the option out")
@@ -249,6 +251,15 @@ def _dispatch(argv: list[str]) -> int:
         code: int = args.run(args)
     sys.stdout.flush()
     return code
+
+
+def is_unicode(text: str) -> bool:
+    """Return whether a text can be written into reports and models; a file name of any bytes cannot."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _check_kinds(args: argparse.Namespace) -> None:

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -175,7 +176,7 @@ def run(args: argparse.Namespace) -> int:
             torque_limit=args.torque_limit, motion=args.motion, motion_map=args.motion_map, remember=True,
             amplitude=args.amplitude,
             frequency=args.frequency, inertia=args.inertia, feed_inertia=args.feed_inertia,
-            compensators=[n.strip() for n in args.compensators.split(",")] if args.compensators else (),
+            compensators=[n.strip() for n in args.compensators.split(",")] if args.compensators is not None else (),
             axes=args.axes, confirm=args.confirm, progress=progress,
         )  # fmt: skip
     written, removed = store(args.out, result) if args.out else (None, False)
@@ -224,7 +225,7 @@ def writable(out: Path, model: Path) -> None:
     from stickslip.errors import InputError
     from stickslip.whole_files import prepared_folder
 
-    if out.resolve() == model.resolve():
+    if os.path.realpath(out) == os.path.realpath(model):
         raise InputError(f"--out {out} is the model itself; give another name, such as recommended.toml")
     if out.is_dir():
         raise InputError(

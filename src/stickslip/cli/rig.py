@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -158,7 +159,7 @@ def performed(args: argparse.Namespace) -> int:
         return told(plan, rig, args)
     if out.is_dir():
         raise InputError(f"--out {out} is a folder; give the name of a file")
-    if args.stream is not None and args.stream.resolve() == out.resolve():
+    if args.stream is not None and os.path.realpath(args.stream) == os.path.realpath(out):
         raise InputError(f"--out and --stream are both {out}; give different names")
     prepared_folder(out.parent)
     _files.refuse_foreign([out], args.force)

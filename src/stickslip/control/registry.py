@@ -7,7 +7,7 @@ come from installed packages (entry point ``stickslip.control_laws``), or from a
 from __future__ import annotations
 
 import importlib
-from pathlib import Path
+import os
 
 from stickslip import plugins
 from stickslip.arguments import arguments_checked
@@ -38,7 +38,7 @@ def control_law(name: str, named_by: str = "") -> ControlLaw:
     UnknownName, LawError, CodeRefused
     """
     if name.endswith(".py"):
-        return _control_law_in(*plugins.code_at(str(Path(name).resolve()), named_by))
+        return _control_law_in(*plugins.code_at(os.path.realpath(name), named_by))
     for folder, names in BUILT_IN.items():
         if name in names:
             found: ControlLaw = importlib.import_module(f"{folder}.{name}").CONTROL_LAW
@@ -50,7 +50,7 @@ def control_law(name: str, named_by: str = "") -> ControlLaw:
 
 def law_or_control_law(path: str, named_by: str = "") -> Law | ControlLaw:
     """What a file defines: a friction law or a control law; `named_by` and errors as in `law`."""
-    file, code = plugins.code_at(str(Path(path).resolve()), named_by)
+    file, code = plugins.code_at(os.path.realpath(path), named_by)
     made = vars(plugins.defined_in(file, code))
     return _control_law_in(file, code) if "CONTROL_LAW" in made else plugins.law_in(file, code)
 

@@ -82,7 +82,9 @@ def _relative(law: str, target: Path) -> str:
     """The path of a law's file as seen from the model's folder."""
     if not law.endswith(".py"):
         return law
-    return Path(os.path.relpath(Path(law).resolve(), target.resolve().parent)).as_posix()
+    return Path(
+        os.path.relpath(Path(os.path.realpath(law)), Path(os.path.realpath(target)).parent)
+    ).as_posix()
 
 
 def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: str = "") -> dict[str, Any]:

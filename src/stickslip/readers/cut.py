@@ -98,9 +98,13 @@ def cut(record: Record, asked: Cut) -> Record:
         return record
     count = len(record)
     number = np.arange(1, count + 1)
-    for option, (low, _) in [("--rows", asked.rows), *(("--leave-out", r) for r in asked.leave_out)]:
+    for option, (low, high) in [("--rows", asked.rows), *(("--leave-out", r) for r in asked.leave_out)]:
         if low > count:
             raise InputError(f"{option} begins at row {low:g}, but the record has {count} rows")
+        if count < high < math.inf:
+            raise InputError(
+                f"{option} ends at row {high:g}, but the record has {count} rows; give {low:g}: for all up to its end"
+            )
     keep = (number >= asked.rows[0]) & (number <= asked.rows[1])
     for low, high in asked.leave_out:
         keep &= (number < low) | (number > high)

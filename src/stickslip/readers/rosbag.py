@@ -6,6 +6,7 @@ as in sensor_msgs/JointState, are named after them. Times are those of the messa
 
 from __future__ import annotations
 
+import os
 import re
 from array import array
 from pathlib import Path
@@ -53,11 +54,11 @@ def _insist_on_own_files(folder: Path) -> None:
     ------
     InputError
     """
-    home = folder.resolve()
+    home = Path(os.path.realpath(folder))
     listed = LISTED.findall((folder / "metadata.yaml").read_text(encoding="utf-8", errors="replace"))
     names = [*listed, *(p.name for p in folder.iterdir())]
     for name in names:
-        if not (folder / name).resolve().is_relative_to(home):
+        if not Path(os.path.realpath(folder / name)).is_relative_to(home):
             raise InputError(
                 f"{folder}: the bag's file {name!r} is outside its folder and is not opened; copy it into the folder"
             )

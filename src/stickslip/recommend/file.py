@@ -55,7 +55,7 @@ def setting_table(found: Identified, advice: Recommendation) -> Table:
     if advice.chosen is None and advice.instead is None:
         raise InputError("no compensator is recommended, so that there is nothing to export")
     result, law, more = _parts(found, advice)
-    return in_memory(model_content(result, found.data, str(Path(law).resolve()) if law else "", more))
+    return in_memory(model_content(result, found.data, os.path.realpath(law) if law else "", more))
 
 
 def _parts(found: Identified, advice: Recommendation) -> tuple[Identification, str, dict[str, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 from pathlib import Path
 
 from stickslip import plugins
@@ -26,7 +27,7 @@ def rig_kind(name: str, named_by: str = "") -> RigKind:
     if name.endswith(".py"):
         if not Path(name).is_file():
             raise InputError(f"no file {name}; give the path of the rig's file")
-        found = getattr(plugins.module_of(*plugins.code_at(str(Path(name).resolve()), named_by)), "RIG", None)
+        found = getattr(plugins.module_of(*plugins.code_at(os.path.realpath(name), named_by)), "RIG", None)
         if found is None:
             raise InputError(f"{name} defines no rig; end it with `RIG = RigKind(...)`")
         return found

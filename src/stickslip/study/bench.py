@@ -309,6 +309,8 @@ def run_bench(
     finished = len(wanted) - len(missing)
     with log.open("a", encoding="utf-8") as lines, ThreadPoolExecutor(jobs) as pool:
         try:
+            if is_cut(log):
+                lines.write("\n")
             for p, line in zip(missing, pool.map(executed, missing)):
                 done[p.run.key] = line = {"run": p.run.key, "fingerprint": prints[p.run.key], **line}
                 lines.write(json.dumps(line) + "\n")
@@ -342,6 +344,12 @@ def kept_in(log: Path) -> dict[str, dict[str, Any]]:
             except (ValueError, KeyError, TypeError):
                 continue
     return found
+
+
+def is_cut(log: Path) -> bool:
+    """Return whether the last line of a file was cut short, so that the next one needs a line of its own."""
+    content = log.read_bytes()
+    return content != b"" and not content.endswith(b"\n")
 
 
 def executed(p: Planned) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import csv
 import importlib
 import json
 import math
+import os
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
@@ -230,7 +231,7 @@ def copy_inputs(folder: Path, files: Sequence[tuple[str, Path]]) -> list[dict[st
     inputs: list[dict[str, str]] = []
     for i, (written, path) in enumerate(files):
         copy = target / (path.name if i == 0 else f"{i}-{path.name}")
-        if copy.resolve() != path.resolve():
+        if os.path.realpath(copy) != os.path.realpath(path):
             write_whole(copy, path.read_bytes())
         inputs.append(
             {"written": written, "copy": copy.relative_to(folder).as_posix(), "sha256": file_hash(copy)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -49,7 +50,7 @@ def _former(folder: Path) -> tuple[Path, dict[str, Path], dict[str, Former], dic
     manifest = read_manifest(folder)
     try:
         source, *others = manifest["inputs"]
-        moved = {str(entry["written"]): (folder / entry["copy"]).resolve() for entry in others}
+        moved = {str(entry["written"]): Path(os.path.realpath(folder / entry["copy"])) for entry in others}
         before = {
             str(e["run"]): (
                 str(e["failure"]),

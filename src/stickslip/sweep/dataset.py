@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -138,7 +139,7 @@ def room_for(folder: Path, sweep: Sweep) -> None:
     """
     import shutil
 
-    place = next(p for p in (folder, *folder.resolve().parents) if p.exists())
+    place = next(p for p in (folder, *Path(os.path.realpath(folder)).parents) if p.exists())
     row = 8 * (1 + len(sweep.drawn.names) + len(sweep.metrics)) + 2
     wanted = (
         sweep.cases * row

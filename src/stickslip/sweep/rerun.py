@@ -77,7 +77,7 @@ def rerun(folder: Path, jobs: int = 1, progress: Progress | None = None) -> Comp
 def _sweep_of(folder: Path, manifest: Mapping[str, Any]) -> Sweep:
     """The sweep that a manifest tells of, with as many cases as were run."""
     source, *others = manifest["inputs"]
-    moved = {entry["written"]: (folder / entry["copy"]).resolve() for entry in others}
+    moved = {entry["written"]: Path(os.path.realpath(folder / entry["copy"])) for entry in others}
     sweep = load(folder / source["copy"], moved)
     sizes = tuple(dataset.size_found(folder, sweep, i) or BLOCK for i in range(len(sweep.runs)))
     return replace(sweep, drawn=replace(sweep.drawn, cases=int(manifest["cases"])), sizes=sizes)

@@ -36,7 +36,7 @@ from stickslip.verbs.export_notes import around_of, axis_of, notes_on, notes_on_
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import require
 from stickslip.verbs.recommendation import RecommendationResult
-from stickslip.whole_files import prepared_folder, write_whole
+from stickslip.whole_files import prepared_folder, write_together
 
 Source = (
     IdentificationResult | RecommendationResult | Model | Controller | PositionMap | str
@@ -91,12 +91,12 @@ class ExportResult:
         """
         prepared_folder(Path(folder))
         paths = tuple(Path(folder) / name for name in self.files)
-        for path, content in zip(paths, self.files.values(), strict=True):
+        for path in paths:
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 raise unwritable(path, error) from None
-            write_whole(path, content)
+        write_together(dict(zip(paths, self.files.values(), strict=True)))
         own_files.written(paths)
         return replace(self, paths=paths)
 
@@ -218,7 +218,8 @@ def export(
         return saved(with_notes(result, renamed), folder)
     job = job_of(source, content, own, chosen)
     given = {**job.settings, **(settings or {})}
-    job = replace(job, single=single, nearest=nearest, top_speed=top_speed or job.top_speed, settings=given)
+    top = job.top_speed if top_speed is None else top_speed
+    job = replace(job, single=single, nearest=nearest, top_speed=top, settings=given)
     return saved(with_notes(exported_law(content, job, chosen, check), renamed), folder)
 
 

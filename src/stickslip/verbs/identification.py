@@ -242,7 +242,7 @@ class IdentificationResult:
 
     def table(self) -> Table:
         """The content of the model's file."""
-        law = str(Path(self.law_file).resolve()) if self.law_file else ""
+        law = os.path.realpath(self.law_file) if self.law_file else ""
         return in_memory(model_content(self.identification, self._data, law, self._recorded()))
 
     @property

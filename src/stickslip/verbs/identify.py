@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any, Literal, Unpack, cast
 
@@ -33,6 +34,7 @@ from stickslip.readers.derive import positioned
 from stickslip.record import Record, encoder_step, row_period
 from stickslip.report.identified import Source
 from stickslip.spec import Law
+from stickslip.values import same
 from stickslip.verbs.examiner import Examiner
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, named, open_log
@@ -176,6 +178,7 @@ def identify(
     sources = sources_of(logs, _listed(hold_out), loop, reading, examiner, steady=kind.takes_steady_points)
     if pendulum:
         sources = [replace(s, findings=with_pendulum(s)) for s in sources]
+    refuse_same(sources)
     records = [s.record for s in sources]
     options = replace(options, held_out=sum(s.held_out for s in sources))
     if method == "axis" and friction_alone(records, options):
@@ -190,6 +193,21 @@ def identify(
     found = with_notes(identified(kind, sources, options), kind, records, options, left_out)
     found = replace(found, findings=tuple(f for s in sources for f in s.findings))
     return IdentificationResult(found, tuple(sources), law_file(found, () if inverse else laws))
+
+
+def refuse_same(sources: Sequence[Source]) -> None:
+    """Refuse a record that is given twice: intervals and held-out errors would come out too small.
+
+    Raises
+    ------
+    InputError
+    """
+    for one, other in combinations(sources, 2):
+        a, b = one.record, other.record
+        if same(a.time, b.time) and same(a.channels, b.channels):
+            raise InputError(
+                f"{one.name} and {other.name} are the same record; give it once, and another one to hold out"
+            )
 
 
 def identified(kind: Method, sources: Sequence[Source], options: Options) -> Identification:

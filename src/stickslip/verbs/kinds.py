@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
+
+from stickslip.config import toml_in
 
 WORDS = {
     "record": ("a record", "a record (CSV, MAT, HDF5, Parquet, ...)"),
@@ -54,7 +55,7 @@ def kind_of(path: Path) -> str:
     if suffix != ".toml" or not path.is_file():
         return ""
     try:
-        return kind_of_toml(tomllib.loads(path.read_text(encoding="utf-8")))
+        return kind_of_toml(toml_in(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, RecursionError):
         return ""
 

@@ -139,7 +139,7 @@ def file_of(
     import tomli_w
 
     text = tomli_w.dumps(tables(given, Place(verb)))
-    name = Path(folder).resolve().name if folder is not None else ""
+    name = Path(os.path.realpath(folder)).name if folder is not None else ""
     with tempfile.TemporaryDirectory(prefix="stickslip-") as temporary:
         path = Path(temporary) / f"{name or verb}.toml"
         try:

@@ -159,6 +159,7 @@ def recommend(
     known_counts = (
         at_hand.encoder.counts if at_hand is not None and counts_per_rev is None else counts_per_rev
     )
+    hertz = 0.5 if frequency is None else frequency
     path, told = None, tuple[str, ...]()
     if motion is not None:
         path, told = motion_in(
@@ -171,7 +172,7 @@ def recommend(
             counts, source = encoder_for(found, counts_per_rev, at_hand, made.encoder_counts)
             return Drive(
                 sample_time=made.sample_time, encoder_counts=counts, encoder_from=source,
-                torque_limit=torque_limit, amplitude=amplitude, frequency=frequency or 0.5, motion=path,
+                torque_limit=torque_limit, amplitude=amplitude, frequency=hertz, motion=path,
                 controller=made, sample_time_from=told_by,
                 reference_velocity=one_of(reference_velocity, made.reference_velocity, "the controller"),
             )  # fmt: skip
@@ -184,7 +185,7 @@ def recommend(
 
         def sampled(period: float, told_by: str = "") -> Drive:
             return Drive(
-                bandwidth, damping, period, counts, limit, amplitude, frequency or 0.5, linear, gains, corner, path,
+                bandwidth, damping, period, counts, limit, amplitude, hertz, linear, gains, corner, path,
                 sample_time_from=told_by, encoder_from=source, reference_velocity=formed,
             )  # fmt: skip
 

@@ -8,7 +8,6 @@ itself counts: what is approved is the text that was shown, known by its SHA-256
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any, cast
@@ -17,6 +16,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from stickslip import approval
+from stickslip.config import toml_in
 from stickslip.errors import CodeRefused
 from stickslip.verbs.kinds import WORDS, kind_of_toml
 from stickslip.web.asking import Refused, Table, body, text
@@ -152,7 +152,7 @@ def main_of(files: Mapping[str, str]) -> tuple[str, str]:
     tables: dict[str, dict[str, Any]] = {}
     for name in (n for n in files if n.lower().endswith(".toml")):
         try:
-            tables[name] = tomllib.loads(files[name])
+            tables[name] = toml_in(files[name])
         except (ValueError, RecursionError) as error:
             raise Refused(400, f"{name} is no TOML ({' '.join(str(error).split())[:200]})") from None
     named = {PurePosixPath(value).name for one in tables.values() for value in texts_in(one)}

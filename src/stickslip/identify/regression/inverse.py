@@ -337,6 +337,12 @@ def _columns(
     gain, loss = axis.drive_gains(experiment.quantity)
     supply = 1.0 if experiment.supply is None else np.interp(t, experiment.time, experiment.supply)
     torque = gain * supply * u - loss * v
+    with np.errstate(over="ignore", invalid="ignore"):
+        if not np.isfinite(torque @ torque):
+            raise InputError(
+                f"{experiment.name}: the drive's signal times {gain:.3g} (drive gain, torque constant) is too large to "
+                "be computed with; correct that number or the unit of the signal"
+            )
     ahead, back = (v > 0.0).astype(float), (v < 0.0).astype(float)
     columns = [acceleration]
     if per_direction:
