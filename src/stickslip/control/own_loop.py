@@ -51,8 +51,10 @@ def split_loop(
     else:
         words = {str(given[REFERENCE_VELOCITY])} if REFERENCE_VELOCITY in given else set[str]()
         numbers = {name: cast("float", x) for name, x in given.items() if name != REFERENCE_VELOCITY}
-        if texts := [f"{name} = {x!r}" for name, x in numbers.items() if isinstance(x, (str, bool))]:
-            raise InputError(f"--loop: {texts[0]} must be a number in SI units")
+        for name, x in numbers.items():
+            if isinstance(x, (str, bool)):
+                quoted = f"; write it without quotes, {x}" if isinstance(x, str) else ""
+                raise InputError(f"--loop: {name} = {x!r} must be a number in SI units{quoted}")
     if len(words) > 1:
         raise InputError(f"--loop: {REFERENCE_VELOCITY} is given {len(words)} times; give it once")
     for word in words:

@@ -153,6 +153,7 @@ def recommend(
         raise InputError("--motion-map says how the log of --motion is read; give that, too")
     if loop is not None:
         refuse_beside_loop(loop, linear=linear, bandwidth=bandwidth, damping=damping)
+    gains, corner, limit, stated = own_loop(loop, torque_limit)
     tried = compensators_of(compensators)
     found = identified_of(model)
     at_hand = load_machine(machine) if isinstance(machine, (str, os.PathLike)) else machine
@@ -179,7 +180,6 @@ def recommend(
 
         drive = drive_with(controller, holding, found, inertia, sample_time, at_hand)
     else:
-        gains, corner, limit, stated = own_loop(loop, torque_limit)
         counts, source = encoder_for(found, counts_per_rev, at_hand)
         formed = one_of(reference_velocity, stated, "--loop")
 
