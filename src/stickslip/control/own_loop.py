@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal, cast
 
+from stickslip.arguments import no_number
 from stickslip.config import named_numbers
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import InputError, UnknownName
@@ -53,8 +54,7 @@ def split_loop(
         numbers = {name: cast("float", x) for name, x in given.items() if name != REFERENCE_VELOCITY}
         for name, x in numbers.items():
             if isinstance(x, (str, bool)):
-                quoted = f"; write it without quotes, {x}" if isinstance(x, str) else ""
-                raise InputError(f"--loop: {name} = {x!r} must be a number in SI units{quoted}")
+                raise no_number("--loop", name, x, "SI units")
     if len(words) > 1:
         raise InputError(f"--loop: {REFERENCE_VELOCITY} is given {len(words)} times; give it once")
     for word in words:
