@@ -238,6 +238,17 @@ def unwritable(path: Path, error: OSError, option: str = "--out") -> InputError:
     return InputError(f"cannot write {shown_path(path)} ({why}); choose another place with {option}")
 
 
+def refuse_nul(path: Path, remedy: str) -> None:
+    """Refuse a path with a NUL character, which no file system takes.
+
+    Raises
+    ------
+    InputError
+    """
+    if "\0" in str(path):
+        raise InputError(f"{str(path)!r} contains a NUL character; {remedy}")
+
+
 def one_line(message: str) -> str:
     """Return a message in one line, the middle of very long names left out."""
     return OVERLONG.sub(r"\1...\2", " ".join(message.split()))
