@@ -1,7 +1,7 @@
-"""Files that are written whole: a draft with a name of its own replaces the file when it is complete.
+"""Atomic writing: a draft replaces the file when it is complete.
 
-Whoever reads the file, and whoever looks after a full disk or a killed process, finds the old file or the new one,
-never a part. The draft's name is random, so it never collides with a file of the user.
+After a full disk or a killed process there is the old file or the new one, never a part. The draft's name is random and
+never collides with a file of the user.
 """
 
 from __future__ import annotations

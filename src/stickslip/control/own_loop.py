@@ -26,7 +26,7 @@ CASCADE_ONLY = tuple(name for name in Cascade._fields if name not in Gains._fiel
 
 
 def loop_text(given: str | Mapping[str, float | str]) -> str:
-    """Return a loop's description as the command line has it."""
+    """Return a loop's description as written on the command line."""
     if isinstance(given, str):
         return given
     words = {name: x if isinstance(x, str) else repr(float(x)) for name, x in given.items()}

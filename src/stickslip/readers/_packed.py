@@ -21,7 +21,7 @@ Member = tuple[str, str]
 
 
 class Damaged(ValueError):
-    """The part of a file that breaks its format."""
+    """A violation of the format of a file."""
 
 
 def cut_off(at: int, size: int) -> Finding:

@@ -27,12 +27,12 @@ TYPES = {
 }  # fmt: skip
 FIELD = re.compile(r"(?P<kind>\w+)(?:\[(?P<count>\d+)\])?\s+(?P<member>\w+)")
 APPENDED = 1
-"""The one flag of the first byte of incompatible flags that is known: data were appended after a crash."""
+"""The known incompatible flag: data were appended after a crash."""
 
 
 @dataclass
 class _Topic:
-    """A subscription: its name in columns, the layout of its samples, and these."""
+    """A subscription: its name in columns, the layout of its samples, and the samples."""
 
     name: str
     members: list[Member]
@@ -55,7 +55,7 @@ def read(path: Path) -> Table:
         columns += _columns(topic)
         insist_on_columns(path, len(columns))
     message = (
-        "a ULog file holds the topics of a vehicle, and its torque setpoints are normalised to -1 ... 1: no field is "
+        "a ULog file has the topics of a vehicle, and its torque setpoints are normalised to -1 ... 1: no field is "
         "taken as a channel by its name"
     )
     remedy = "map the fields of one axis, such as --map velocity=esc_status.esc[0].esc_rpm:rpm"

@@ -87,7 +87,7 @@ def read(path: Path) -> Table:
     if unread:
         names = ", ".join(repr(name) for name in list(unread)[:4]) + (", ..." if len(unread) > 4 else "")
         message = (
-            f"{len(unread)} entries hold no numbers, or arrays of changing length, and were left out: {names}"
+            f"{len(unread)} entries have no numbers, or arrays of changing length, and were left out: {names}"
         )
         findings.append(Finding("note", "not-read", message))
     return Table("wpilog", tuple(columns), findings=tuple(findings), unread=unread)
@@ -124,7 +124,7 @@ def _records(content: bytes, at: int) -> Iterator[tuple[int, int, bytes]]:
         time_end = size_end + 1 + (bits >> 4 & 7)
         size = int.from_bytes(content[entry_end:size_end], "little")
         if time_end + size > end:
-            # A robot that is switched off leaves zeros or half a record at the end.
+            # The log of a robot that is switched off ends in zeros or half a record.
             if any(content[at:]):
                 yield -1, at, b""
             return
@@ -172,7 +172,7 @@ def _text(data: bytes) -> str:
 
 
 def _columns(entry: _Entry, schemas: dict[str, str]) -> list[Column]:
-    """The columns of an entry; none where it does not hold the same count of numbers in every sample."""
+    """Return the columns of an entry; an empty list if its samples differ in size."""
     sizes = {len(sample) for sample in entry.samples}
     if len(sizes) != 1:
         return []

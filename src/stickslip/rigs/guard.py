@@ -123,7 +123,7 @@ class Guard:
         return True
 
     def end_ramp(self) -> bool:
-        """The torque is zero: a controller that goes on begins without torque. Whether nothing went wrong meanwhile."""
+        """Note that the torque is zero, and return whether no fault has occurred meanwhile."""
         if self._safety["reason"] != NONE:
             self._safety["state"] = STOPPED
             return False
@@ -198,7 +198,7 @@ def clock_fault(rig: str, step: float, where: str) -> MeasurementFault:
 
 
 def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] | None:
-    """What is not as expected of a rig's answer (`stickslip.rigs.safety`), and the remedy; None for other reasons."""
+    """Return the fault in a rig's answers (`stickslip.rigs.safety`) and its remedy; None for other reasons."""
     waited = f"for {limits.answer_time:g} s (limit answer_time)"
     wiring = (
         "check the current loop, the sign and the torque constant; a rig that measures no torque returns NaN"

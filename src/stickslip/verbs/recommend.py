@@ -313,7 +313,7 @@ def drive_with(
 def one_of(
     given: ReferenceVelocity | None, own: ReferenceVelocity | None, owner: str
 ) -> ReferenceVelocity | None:
-    """How the drive forms its reference velocity: as given, or as its loop says.
+    """Return how the drive forms its reference velocity: as given, or as its loop states.
 
     Raises
     ------
