@@ -51,7 +51,7 @@ CALLS: list[tuple[str, str, Callable[..., Any]]] = [
     ("sweep", "cases", lambda x: ss.sweep(ROOT / "sweep" / "small.toml", cases=x)),
     ("compare", "top", lambda x: ss.compare("a.toml", "b.toml", top=x)),
     ("recommend", "bandwidth", lambda x: ss.recommend("a.toml", bandwidth=x)),
-    ("loop", "kp", lambda x: ss.recommend("a.toml", loop={"kp": x})),
+    ("recommend", r"loop\[.kp.\]", lambda x: ss.recommend("a.toml", loop={"kp": x})),
 ]  # fmt: skip
 
 
@@ -111,8 +111,8 @@ def test_what_is_no_model_is_said_where_it_is_given() -> None:
 LOG: dict[str, Any] = {"t": [0.0, 1.0], "position": [0.0, 1.0], "torque": [0.0, 1.0]}
 FOUND: list[tuple[Callable[..., Any], str]] = [
     (lambda: ss.identify(**LOG, law=3), "identify: law = 3 must be text, a Law or a list of these"),
-    (lambda: ss.identify(**LOG, loop=5), "identify: loop = 5 must be text, a mapping of names to a number or text or a "
-     "list of these, such as {'kp': 8.0, 'kd': 0.08}"),
+    (lambda: ss.identify(**LOG, loop=5), "identify: loop = 5 must be text, a mapping of names to a number or "
+     "'difference' or 'instant' or a list of these, such as {'kp': 8.0, 'kd': 0.08}"),
     (lambda: ss.identify(**LOG, loop={}), 'loop: {} names no gain; give them, such as loop={"kp": 8, "kd": 0.08}, or '
      "leave it out"),
     (lambda: ss.identify(**LOG, loop_output="foo"), "identify: loop_output = 'foo' must be 'torque', 'current' or "

@@ -33,6 +33,7 @@ T = np.arange(0.0, 2.0, 1e-3)
         ("with --leave-out spikes", "identify", False, 'with leave_out=["spikes"]'),
         ("with --leave-out 1:4 --leave-out 7:9, or", "identify", False, 'with leave_out=["1:4", "7:9"], or'),
         ("its controller (--loop kp=..,kd=..)", "identify", False, 'its controller (loop={"kp": .., "kd": ..})'),
+        ("--loop kp=nan: nan must be", "recommend", False, 'loop={"kp": nan}: nan must be'),
         ("give --side load, and", "identify", False, 'give side="load", and'),
         ("identify with --pendulum, or", "identify", False, "identify with pendulum=True, or"),
         ("say so: --torque-is commanded and --delay 0. Or", "identify", False,

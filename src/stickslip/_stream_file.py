@@ -142,7 +142,7 @@ class StreamFile:
             self._file = -1
 
     def discard(self) -> None:
-        """Close and remove it, unless another file has its name by now: it holds nothing."""
+        """Close and remove it, unless another file has its name by now: it is empty."""
         self.close()
         with suppress(OSError):
             found = os.stat(self.path)
@@ -220,7 +220,7 @@ def load(path: str | os.PathLike[str]) -> Contents:
 
 
 def empty_end(rows: Array) -> int:
-    """How many rows at the end hold zeros alone: their number had reached the disk before they did."""
+    """Return the number of rows at the end that contain zeros alone: their count was on the disk before their data."""
     written = np.flatnonzero(np.any(rows != 0.0, axis=1))
     return len(rows) - max(1, int(written[-1]) + 1 if written.size else 1) if len(rows) else 0
 

@@ -127,7 +127,7 @@ def _approved() -> set[str]:
     try:
         if exposure := exposure_of(file):
             warnings.warn(
-                f"approvals in {file} count for nothing, as {exposure}; correct the owner and the mode (chmod go-w)",
+                f"approvals in {file} are ignored, as {exposure}; correct the owner and the mode (chmod go-w)",
                 UnusedPlace,
                 stacklevel=2,
             )
@@ -141,7 +141,7 @@ def _approved() -> set[str]:
 def _note(path: str, digest: str) -> None:
     _ran.add(digest)
     if _remember.get() and digest not in _approved():
-        with suppress(InputError):  # Without a folder of settings it is asked for again.
+        with suppress(InputError):  # Without a folder of settings the next run requires it again.
             approve(path, digest)
 
 

@@ -69,9 +69,7 @@ def shown_value(value: object) -> str:
     """Return a value as messages show it: in one line of at most 60 characters, whatever it contains."""
     try:
         shown = " ".join(repr(value).split())
-    except (
-        Exception
-    ):  # nested too deeply, a number with more digits than Python prints, or a class whose repr fails
+    except Exception:  # nested too deeply, too many digits, or a class whose repr fails
         shown = " ".join(reprlib.repr(value).split())
     return shown if len(shown) <= 60 else f"{shown[:57]}..."
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self, cast
 
-from stickslip.errors import ConfigError, InputError, ModelRemark, suggestion
+from stickslip.errors import ConfigError, InputError, ModelRemark, refuse_nul, suggestion
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 SHOWN = 5
@@ -81,8 +81,7 @@ def refuse_endless(path: Path) -> None:
     ------
     InputError
     """
-    if "\0" in str(path):
-        raise InputError(f"{str(path)!r} contains a NUL character; correct the path")
+    refuse_nul(path, "correct the path")
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise InputError(f"{path} is a pipe or device, not a file; save its content to a file and give that")
 

@@ -13,7 +13,7 @@ The tree of exceptions::
     │   ├── LimitCrossed              position, speed, torque, temperature or following error
     │   ├── MessageLost               a message to or from the rig did not arrive in time
     │   ├── DriveFault                the rig itself reported a fault
-    │   ├── MeasurementFault          readings or clock of the rig stand still, jump or contradict the torque
+    │   ├── MeasurementFault          readings or clock of the rig freeze, jump or contradict the torque
     │   ├── Overrun                   a controller in Python took more than its time
     │   ├── RecordFault               the record could not be written: a full disk
     │   └── Interrupted               a signal asked for the end
@@ -157,7 +157,7 @@ class DriveFault(RigError):
 
 
 class MeasurementFault(RigError):
-    """The rig's readings or its clock stand still, jump or contradict the torque command."""
+    """The rig's readings or its clock freeze, jump or contradict the torque command."""
 
 
 class Overrun(RigError):
@@ -238,6 +238,17 @@ def unwritable(path: Path, error: OSError, option: str = "--out") -> InputError:
     return InputError(f"cannot write {shown_path(path)} ({why}); choose another place with {option}")
 
 
+def refuse_nul(path: Path, remedy: str) -> None:
+    """Refuse a path with a NUL character, which no file system takes.
+
+    Raises
+    ------
+    InputError
+    """
+    if "\0" in str(path):
+        raise InputError(f"{str(path)!r} contains a NUL character; {remedy}")
+
+
 def one_line(message: str) -> str:
     """Return a message in one line, the middle of very long names left out."""
     return OVERLONG.sub(r"\1...\2", " ".join(message.split()))
@@ -249,13 +260,13 @@ def shown_path(path: object) -> str:
 
 
 OVERLONG = re.compile(r"(\S{100})\S{100,}(\S{50})")
-"""A path, name or value that would bury the rest of a message"""
+"""A path, name or value too long for a message."""
 BEYOND = (OSError, OverflowError, RecursionError, MemoryError, UnicodeError)
-"""Errors that Python itself raises of a path, a number, a nesting, a size or a text that nothing can work with"""
+"""Errors that Python raises for a path, number, nesting, size or text out of range."""
 
 
 def beyond(error: BaseException) -> InputError:
-    """Return the error of one of `BEYOND` in words: what was given is out of the range of files, numbers or memory."""
+    """Return the package's error for one of `BEYOND`: input out of the range of files, numbers or memory."""
     said = " ".join(str(error).split())[:200]
     if isinstance(error, OSError):
         why = error.strerror or said
@@ -267,7 +278,7 @@ def beyond(error: BaseException) -> InputError:
             f"a number is out of range ({said}); give numbers of a size that occurs on a machine"
         )
     if isinstance(error, RecursionError):
-        return InputError("what was given contains itself, or is nested too deeply; give it flat")
+        return InputError("an argument contains itself, or is nested too deeply; flatten it")
     if isinstance(error, MemoryError):
         return InputError(
             f"this needs more memory than there is ({said or 'out of memory'}); reduce the numbers or the data"

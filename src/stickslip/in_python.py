@@ -27,7 +27,7 @@ MAPS = re.compile(rf"({MAP}(?: {MAP})*)( (?=--))?")
 ONE_MAP = re.compile(r"--(?:motion-)?map (?:'([^']+)'|(\S+))")
 SET = re.compile(r"--set (\w+)=(\.\.|[^\s,;:)]*)")
 FREEZE = re.compile(r"--freeze (\w+)=([^\s,;:)]+)")
-LOOP = re.compile(r"--loop (\w+=[^\s;)]*[^\s;),])")
+LOOP = re.compile(r"--loop (\w+=[^\s;)]*[^\s;),:])")
 TIMING = re.compile(r"--torque-is (commanded|actual|mean)\b")
 SIMULATE = "`stickslip simulate`"
 """The command that is a function, in messages that name nothing but the command"""

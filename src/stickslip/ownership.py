@@ -1,4 +1,4 @@
-"""Files that only this user can change: code that is kept there for later is run, code elsewhere is not."""
+"""Ownership of files: kept code runs only if no other user can change its file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def exposure_of(path: Path) -> str:
-    """Return how another user could change a file or folder, as half a sentence; empty if none could.
+    """Return how another user could change a file or folder, as a clause; empty if none could.
 
     Every folder above it counts too, since whoever may rename it may replace it. The administrator (root) and a group
     that has this user's own name count as this user. Windows keeps such rights elsewhere; nothing is checked there.

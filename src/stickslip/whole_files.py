@@ -1,7 +1,7 @@
-"""Files that are written whole: a draft with a name of its own replaces the file when it is complete.
+"""Atomic writing: a draft replaces the file when it is complete.
 
-Whoever reads the file, and whoever looks after a full disk or a killed process, finds the old file or the new one,
-never a part. The draft's name is random, so it never collides with a file of the user.
+After a full disk or a killed process there is the old file or the new one, never a part. The draft's name is random and
+never collides with a file of the user.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Generator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from stickslip.errors import InputError, unwritable
+from stickslip.errors import InputError, refuse_nul, unwritable
 
 DRAFTS = ".stickslip-*.part"
 """Pattern of the names of drafts, to remove those that a killed process left behind."""
@@ -36,7 +36,7 @@ def draft_of(target: Path, option: str = "--out") -> Generator[Path]:
     InputError
         If the file cannot be written, or `target` is a folder, a pipe or a device.
     """
-    refuse_nul(target, option)
+    refuse_nul(target, f"choose another place with {option}")
     try:
         final = Path(os.path.realpath(target))
         exists = final.exists()
@@ -101,7 +101,7 @@ def prepared_folder(folder: Path, option: str = "--out") -> Path:
     ------
     InputError
     """
-    refuse_nul(folder, option)
+    refuse_nul(folder, f"choose another place with {option}")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / DRAFTS.replace("*", secrets.token_hex(8))
@@ -110,14 +110,3 @@ def prepared_folder(folder: Path, option: str = "--out") -> Path:
     except OSError as error:
         raise unwritable(folder, error, option) from None
     return folder
-
-
-def refuse_nul(path: Path, option: str = "--out") -> None:
-    """Refuse a path with a NUL character, which no file system takes.
-
-    Raises
-    ------
-    InputError
-    """
-    if "\0" in str(path):
-        raise InputError(f"{str(path)!r} contains a NUL character; choose another place with {option}")

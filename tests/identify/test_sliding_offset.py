@@ -154,3 +154,9 @@ def test_by_direction_a_law_takes_it_up() -> None:
         ss.identify(record(0.04), method="sliding", per_direction=True)
     with pytest.raises(InputError, match="both directions, and the record has one"):
         ss.identify(record(0.04, (1.0,)), method="sliding", law="coulomb", per_direction=True)
+
+
+def test_a_criterion_that_too_few_points_do_not_have_is_left_out() -> None:
+    found = identify_sliding(points(0.0, 1, (6.0, 12.0, -6.0, -12.0), std=False), COULOMB, starts=4)
+    assert "aicc" not in found.misfit
+    assert np.isfinite(list(found.misfit.values())).all()

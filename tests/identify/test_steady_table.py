@@ -139,7 +139,7 @@ def test_other_methods_name_the_method_for_tables(tmp_path: Path, capsys: pytest
     )
     unnamed = write(tmp_path, "velocity [rad/s],M", BOTH, torque(BOTH))
     assert main(["identify", unnamed, "--method", "sliding"]) == 2
-    assert "say --map torque=COLUMN:UNIT" in capsys.readouterr().err
+    assert "give --map torque=COLUMN:UNIT" in capsys.readouterr().err
 
 
 @pytest.mark.filterwarnings("error")

@@ -356,3 +356,13 @@ def test_a_separator_at_the_end_of_every_line(tmp_path):
     table = open_table(path)
     assert [c.name for c in table.columns] == ["ActTorque", "ActPos"]
     assert not table.findings
+
+
+def test_a_comma_between_thousands_is_no_decimal_sign(tmp_path: Path) -> None:
+    rows = ["Name\tActPos\tName\tActTorque", "SampleTime[ms]\t1\tSampleTime[ms]\t1", "Unit\tdeg\tUnit\tNmm"]
+    rows += [f"{k}\t{0.5 * k:.1f}\t{k}\t1,{234 + k}" for k in range(20)]
+    file = tmp_path / "scope.csv"
+    file.write_text("\n".join(rows) + "\n")
+    table = open_table(file)
+    assert table.columns[1].values[:2].tolist() == [1234.0, 1235.0]
+    assert "thousands" in {finding.code for finding in table.findings}

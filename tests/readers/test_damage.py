@@ -118,3 +118,10 @@ def test_a_call_answers_raises_or_says_how_it_ended():
         _guard.call(os.abort, limit=30.0)
     # Noise of a library is no part of the answer.
     assert _guard.call(print, "noise", limit=30.0) is None
+
+
+def test_a_folder_has_the_time_that_its_files_need(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with (tmp_path / "bag.db3").open("wb") as file:
+        file.truncate(400_000_000)
+    monkeypatch.setattr(_guard, "call", lambda *_, limit, memory: limit)
+    assert _guard.read_apart(len, tmp_path, library="rosbags") == 3.0 * _guard.PATIENCE

@@ -122,7 +122,7 @@ def test_the_axis_that_has_a_torque_is_taken(tmp_path):
 def test_one_torque_for_an_array_of_joints_is_not_guessed(tmp_path):
     path = saved(tmp_path, q=Q, tau=TAU[:, 1])
     with pytest.raises(
-        InputError, match=r"the file has several axes, and its torque or current names none; say which"
+        InputError, match=r"the file has several axes, and its torque or current names none; choose"
     ):
         read(path)
     assert taken(read(path, ["position=q[1]"])) == {"position": "q[1]", "motor_torque": "tau"}

@@ -216,7 +216,7 @@ def test_a_test_that_is_no_table_is_refused(tmp_path):
     (tmp_path / "a.json").write_text(
         json.dumps({"slow-forward": [[1, 2, 3]], "slow-backward": [[1, 2, 3, 4]]})
     )
-    with pytest.raises(InputError, match="'slow-forward' is no table of numbers with 4, 9 or 10 columns"):
+    with pytest.raises(InputError, match="'slow-forward' is not a table of numbers with 4, 9 or 10 columns"):
         read("a.json")
 
 

@@ -175,7 +175,7 @@ def test_what_is_missing_is_recorded_next() -> None:
     assert one_number_each(wide) == ["inertia, sigma2 not identified: too wide"]
     told = [line for line in result_lines(poor, answers) if line.startswith("measure next")]
     assert told[1] == (
-        "measure next: To settle inertia, record accelerations to and fro with your drive, or let a rig do it: "
+        "measure next: To settle inertia, record accelerations back and forth with your drive, or let a rig do it: "
         "stickslip rig run inertia --rig machine.toml --out inertia.npz"
     )
     in_python = [x for x in result_lines_in_python(poor, answers) if x.startswith("measure next")]

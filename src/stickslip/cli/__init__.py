@@ -108,9 +108,9 @@ def whole_number(text: str) -> int:
     Raises
     ------
     ValueError
-        Of a text that is no whole number.
+        If it is not a whole number.
     ArgumentTypeError
-        Of one that no counter holds.
+        If it is too large for a counter.
     """
     number = int(text)
     if abs(number) >= LARGEST_WHOLE:
@@ -124,9 +124,9 @@ def real_number(text: str) -> float:
     Raises
     ------
     ValueError
-        Of a text that is no number.
+        If it is not a number.
     ArgumentTypeError
-        Of NaN, and of one that is too large or too small to be computed with.
+        If it is NaN, or too large or too small to compute with.
     """
     number = float(text)
     digits = text.lower().partition("e")[0]
@@ -233,7 +233,7 @@ def _dispatch(argv: list[str]) -> int:
         raise InputError(f"the argument {odd!r} is not Unicode; rename the file or folder in UTF-8")
     if odd := next((word for word in argv if OPTION.match(word) and word.partition("=")[2] == "--"), ""):
         # argparse drops these two dashes and hands an empty list to the verb.
-        raise InputError(f"{odd}: -- is no value; give one, or leave the option out")
+        raise InputError(f"{odd}: -- is not a value; give one, or leave the option out")
     parser = parser_of(argv[:1] if argv and argv[0] in VERBS else VERBS)
     try:
         args: Any = parser.parse_args(argv)

@@ -271,7 +271,7 @@ def options_of(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def tell(line: str) -> None:
-    """What is odd about a log, before anything is computed."""
+    """Print a warning about a log on stderr."""
     print(f"stickslip: {one_line(line)}", file=sys.stderr)
 
 

@@ -91,7 +91,7 @@ def stamped(record: Record, procedure: Procedure, rig: Rig) -> Record:
 
 
 def kept(path: Path, procedure: Procedure, rig: Rig, *, insist: bool) -> Performed | str:
-    """What was recorded in a file, or why it is measured again; empty where there is no file.
+    """Return the record in a file, or the reason to measure it again; an empty text if there is no file.
 
     With `insist`, a record that failed a check is none: it would fail at the same place for ever.
 

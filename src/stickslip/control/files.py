@@ -157,7 +157,7 @@ def composed(
 
 
 def reference_velocity_in(table: Table) -> ReferenceVelocity | None:
-    """How a controller's table forms the reference velocity; None where it does not say so."""
+    """Return how a controller's table forms the reference velocity; None if it does not state it."""
     if not table.has(REFERENCE_VELOCITY):
         return None
     return cast("ReferenceVelocity", table.choice(REFERENCE_VELOCITY, REFERENCE_VELOCITIES))

@@ -7,10 +7,9 @@ is a word of the same description, ``reference_velocity=difference``.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal, cast
+from typing import Literal
 
-from stickslip.arguments import no_number
-from stickslip.config import named_numbers
+from stickslip.config import named_numbers, named_values
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import InputError, UnknownName
 
@@ -26,8 +25,8 @@ USUAL_TIME = 1e-3
 CASCADE_ONLY = tuple(name for name in Cascade._fields if name not in Gains._fields)
 
 
-def loop_text(given: str | Mapping[str, float | str]) -> str:
-    """Return a loop's description as the command line has it."""
+def loop_text(given: str | Mapping[str, float | ReferenceVelocity]) -> str:
+    """Return a loop's description as written on the command line."""
     if isinstance(given, str):
         return given
     words = {name: x if isinstance(x, str) else repr(float(x)) for name, x in given.items()}
@@ -35,7 +34,7 @@ def loop_text(given: str | Mapping[str, float | str]) -> str:
 
 
 def split_loop(
-    given: str | Mapping[str, float | str],
+    given: str | Mapping[str, float | ReferenceVelocity],
 ) -> tuple[dict[str, float], ReferenceVelocity | None]:
     """Return the numbers of a loop's description, and how its drive forms the reference velocity, if it is stated.
 
@@ -44,24 +43,12 @@ def split_loop(
     InputError
         If an entry is not NAME=VALUE, or the reference velocity is neither kind.
     """
-    if isinstance(given, str):
-        entries = [entry.partition("=") for entry in given.split(",")]
-        words = {value.strip() for name, _, value in entries if name.strip() == REFERENCE_VELOCITY}
-        pairs = ["".join(entry) for entry in entries if entry[0].strip() != REFERENCE_VELOCITY]
-        numbers = named_numbers(pairs, "--loop", infinite=("limit",))
-    else:
-        words = {str(given[REFERENCE_VELOCITY])} if REFERENCE_VELOCITY in given else set[str]()
-        numbers = {name: cast("float", x) for name, x in given.items() if name != REFERENCE_VELOCITY}
-        for name, x in numbers.items():
-            if isinstance(x, (str, bool)):
-                raise no_number("--loop", name, x, "SI units")
-    if len(words) > 1:
-        raise InputError(f"--loop: {REFERENCE_VELOCITY} is given {len(words)} times; give it once")
-    for word in words:
-        if word not in REFERENCE_VELOCITIES:
-            raise UnknownName(f"{REFERENCE_VELOCITY} of --loop", word, REFERENCE_VELOCITIES)
-        return numbers, word
-    return numbers, None
+    named = named_values(loop_text(given).split(",") if given else (), "--loop")
+    formed = named.pop(REFERENCE_VELOCITY, None)
+    if formed is not None and formed not in REFERENCE_VELOCITIES:
+        raise UnknownName(f"{REFERENCE_VELOCITY} of --loop", formed, REFERENCE_VELOCITIES)
+    pairs = [f"{name}={text}" for name, text in named.items()]
+    return named_numbers(pairs, "--loop", infinite=("limit",)), formed
 
 
 def kind_of_loop(numbers: Mapping[str, float], beside: Sequence[str]) -> type[Gains] | type[Cascade]:

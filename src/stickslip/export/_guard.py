@@ -1,7 +1,7 @@
-"""The step of an exported law refuses inputs that are no numbers, as the controllers do: none reaches the state.
+"""Guard the step of an exported law against NaN and infinite inputs, as the controllers are guarded.
 
-Laws are written without such a test: in this package nothing calls them with such inputs. On a drive one bad sample
-would stay in the state for ever.
+Laws contain no such test, as this package never calls them with such inputs. On a drive one bad sample would stay in
+the state forever.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from stickslip.control.composition import LARGEST
 from stickslip.export._analysis import fields_read
 from stickslip.export._text import first_line
 
-REFUSES = "An input that is no finite number gives 0 and leaves the state as it is."
+REFUSES = "At an input that is not finite the torque is 0 and the state does not change."
 CLOCK = 1e-6
 """Factor on the time: clocks that count from 1970 are beyond `LARGEST` seconds."""
 
 
 def guarded(functions: Mapping[str, ast.FunctionDef], entry: str = "_step") -> dict[str, ast.FunctionDef]:
-    """Functions of a law, callees first, whose step leaves the state as it is at an input that is no number.
+    """Return the functions of a law, callees first, with a step that checks its inputs.
 
-    The torque of such a step is 0. An infinite number, or one that no machine has (`LARGEST`), is none either.
+    If an input is NaN, infinite or beyond `LARGEST`, the torque of the step is 0 and the state does not change.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def guarded(functions: Mapping[str, ast.FunctionDef], entry: str = "_step") -> d
 
 
 def _guard(step: ast.FunctionDef, entry: str, inner: str, read: list[str]) -> ast.FunctionDef:
-    """A function of the same arguments that calls the step where all of its inputs are numbers."""
+    """Return a function with the same arguments that calls the step if all of its inputs are finite."""
     arguments = [a.arg for a in step.args.args]
     around = arguments[5]
     sizes = [f"abs({name})" for name in arguments[:3]]

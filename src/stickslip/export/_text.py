@@ -36,7 +36,7 @@ STRING = {'"': "'", "\\": "/"}
 INSTEAD: Mapping[str, Mapping[str, str]] = {
     "comp": STRING, "mo": STRING, "py": {'"': "'"}, "md": {"<": "&lt;", "|": "\\|"}, "xml": XML, "urdf": XML,
 }  # fmt: skip
-"""By the ending of a file, what would end a string, a cell or an attribute, and what stands for it."""
+"""By the ending of a file: text that would end a string, a cell or an attribute, and its replacement."""
 UNICODE = ("md", "py", "xml", "urdf")
 """Endings of files that are read as UTF-8 everywhere; others have ASCII."""
 
@@ -56,7 +56,7 @@ def folded(text: str) -> str:
 
 
 def text_in(language: str, text: str) -> str:
-    """Return a text as a comment or a string of a language holds it.
+    """Return a text that is safe in a comment or a string of a language.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def text_in(language: str, text: str) -> str:
 
 
 def ascii_only(text: str) -> str:
-    """Text for compilers and terminals that know no other letters."""
+    """Return a text in ASCII, for compilers and terminals that need it."""
     for letter, plain in LETTERS.items():
         text = text.replace(letter, plain)
     return text.encode("ascii", "replace").decode()
@@ -122,7 +122,7 @@ def render(template: str, **values: Any) -> str:
 
 
 def summary(name: str, text: str) -> str:
-    """The summary of a function's docstring; its name where it has none, as a comment is never empty."""
+    """Return the summary of a function's docstring, or its name if it has none, as a comment is never empty."""
     return first_line(text) or f"{name.strip('_')}()"
 
 

@@ -84,7 +84,7 @@ def _asymmetric() -> tuple[Form, ...]:
 
 
 def nearest_to(job: Job) -> Nearest:
-    """What MuJoCo holds of the job's model; a difference between the directions as a constant torque."""
+    """Return MuJoCo's nearest model; a difference between the directions becomes a constant torque."""
     return carried(job, TARGET.name, TARGET.forms if job.model.law.odd else (*TARGET.forms, *_asymmetric()))
 
 

@@ -128,12 +128,6 @@ def identified_in(table: Table) -> Identified:
     except (TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{file}: its estimates cannot be read ({error}); identify the axis again") from None
     axis = dict(_table(content, "axis", file))
-    for name, value in axis.items():
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if name != "seen_from" and not (number and math.isfinite(value)):
-            raise InputError(
-                f"{file}: axis.{name} = {value!r} must be a number in SI units, and finite; correct it"
-            )
     try:
         speeds = {
             k: np.abs(np.array(v, dtype=np.float64)) for k, v in _table(content, "speeds", file).items()

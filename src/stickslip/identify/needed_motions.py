@@ -1,4 +1,4 @@
-"""The procedure of a rig that determines a number, and the motion that it makes."""
+"""Procedures of a rig that determine the parameters of a model, and their motions."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ EXPERIMENTS = {
     "fc": "sliding", "vs": "sliding", "sigma2": "sliding", "delta_s": "sliding",
     "sigma1": "stickslip", "c": "stickslip",
 }  # fmt: skip
-"""The procedure that a rig runs for a number."""
+"""Procedure of a rig, by parameter."""
 MOTIONS = {
-    "inertia": "accelerations to and fro", "sliding": "constant speeds in both directions, three of them at least",
+    "inertia": "accelerations back and forth", "sliding": "constant speeds in both directions, three of them at least",
     "breakaway": "slow ramps of the torque from rest, until it moves",
-    "presliding": "slow ramps of the torque to and fro, below break-away", "stickslip": "slow constant speeds",
+    "presliding": "slow ramps of the torque back and forth, below break-away", "stickslip": "slow constant speeds",
 }  # fmt: skip
-"""What it moves, for a drive that does it in a program of its own."""
+"""Motion of each procedure, for a drive that runs its own program."""
 
 
 def experiment_for(name: str) -> str:
-    """Return the procedure that determines a number of this name, ``axis.k[1]`` or ``fc_negative`` among them."""
+    """Return the procedure that determines a parameter, such as ``axis.k[1]`` or ``fc_negative``."""
     return EXPERIMENTS.get(name.partition("[")[0].rpartition(".")[2].removesuffix("_negative"), "sliding")
 
 
 def motion_for(name: str) -> str:
-    """Return the motion that determines a number of this name."""
+    """Return the motion that determines a parameter."""
     return MOTIONS[experiment_for(name)]

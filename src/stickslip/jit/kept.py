@@ -172,7 +172,7 @@ def cached(compiled: Any, function: Any) -> Any:
 
 
 def _write_module(path: Path, text: str) -> None:
-    """Write a module by a draft of its own, so that no other process or thread reads half a file."""
+    """Write a module through a separate draft: no other process or thread reads half a file."""
     draft = path.with_suffix(f".{os.getpid()}.{threading.get_ident()}.tmp")
     try:
         draft.write_text(text)

@@ -210,7 +210,7 @@ def _unit_of(column: Column) -> str:
 
 
 def _name_of(column: Column) -> Name:
-    """What a column is: as its format defines it, else as its name and unit indicate."""
+    """Return what a column is, by its format, else by its name and unit."""
     read = role_of(column.name, _unit_of(column))
     if not column.channel:
         return read

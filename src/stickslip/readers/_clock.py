@@ -45,12 +45,12 @@ COUNTERS, NEAR = (16, 24, 32), 4.0
 FIRST = ("position", "velocity", "motor_torque")
 """Channels whose times are the record's, the first that is present."""
 MOST_FILLED, UNEVEN, EVEN = 0.9, 0.5, 0.95
-"""A column that is sampled slower than others: at most this part of the rows between its first and last value has one,
-and its times are even: this part of the steps is off by at most this part of the usual step. Lost samples are not."""
+"""A column is sampled slower than the others if at most `MOST_FILLED` of the rows between its first and last value have
+one, and if `EVEN` of its steps are within `UNEVEN` of the median step. Lost samples are not evenly spaced."""
 LONGEST_NAME = 60
-"""Letters of a column's name that an error quotes."""
+"""Characters of a column's name that an error quotes."""
 EFFORTS = {"motor_torque", "friction_torque", "sensor_torque", "current"}
-"""Channels that tell the torque at a constant velocity."""
+"""Channels from which the torque at a constant velocity follows."""
 SAME = 0.01
 """Part of a stated period by which a column of times may differ from it without a word."""
 
@@ -126,19 +126,19 @@ def _period_of(table: Table) -> tuple[str, float] | None:
 
 
 def _of_tool(table: Table) -> str:
-    """What is known of the tool that wrote the table, for an error."""
+    """Return the notes on the tool that wrote the table, to end an error."""
     return "".join(f"; {f.message}; {f.remedy}" for f in table.findings if f.code == "tool")
 
 
 def _as_steady(by_role: Mapping[str, Choice]) -> str:
-    """What a table of steady points needs, if this may be one."""
+    """Return what a table of steady points needs, to end an error; empty if this cannot be one."""
     if may_be_steady(by_role):
         return "; a table of constant velocities and their torques is for --method sliding"
     parts = {"velocity": "velocity" in by_role, "torque": bool(by_role.keys() & EFFORTS)}
     if "position" in by_role or not any(parts.values()):
         return ""
     lacking = next(name for name, known in parts.items() if not known)
-    return f"; for a table of steady points (--method sliding) say --map {lacking}=COLUMN:UNIT"
+    return f"; for a table of steady points (--method sliding) give --map {lacking}=COLUMN:UNIT"
 
 
 def may_be_steady(by_role: Mapping[str, Choice]) -> bool:

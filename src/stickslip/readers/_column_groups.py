@@ -50,7 +50,7 @@ IN_TIME = re.compile(r"[xt]\d*|x_value")
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the groups of a table with rows of keys are.
+    """Layout of a table with rows of keys and groups of columns.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ TIMES = ("time", "Time", "t", "timestamp")
 
 
 class _Layout:
-    """Collects what a tree holds; `source` is the file that it comes from, None for data in memory."""
+    """Collects the columns and constants of a tree; `source` is its file, None for data in memory."""
 
     def __init__(self, source: Path | None) -> None:
         self._source = source
@@ -49,7 +49,7 @@ class _Layout:
         self._parts += 1
         if self._parts > MAX_PARTS:
             raise InputError(
-                f"{self._source or 'log'} has more than {MAX_PARTS} groups and values beside the samples; give only "
+                f"{self._source or 'log'} has more than {MAX_PARTS} groups and single values; give only "
                 "the columns that you need"
             )
         if isinstance(value, (str, bytes, bool, int, float)):

@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from stickslip.capacity import limit_memory
+from stickslip.errors import InputError
+from stickslip.readers.limits import memory_for, size_of, too_large
 
 T = TypeVar("T")
 PATIENCE = 20.0
@@ -24,9 +26,25 @@ class Died(Exception):
     """How the process ended without an answer."""
 
 
-def patience(path: Path) -> float:
-    """How long reading a file may take, s."""
-    return PATIENCE * (1.0 + path.stat().st_size / 200e6)
+def read_apart(function: Callable[..., T], path: Path, *more: Any, library: str) -> T:
+    """Return ``function(path, *more)``, which reads a file or folder with a C library, in limited time and memory.
+
+    Raises
+    ------
+    InputError
+        If the function does, or the library takes more, or crashes.
+    """
+    size = size_of(path)
+    try:
+        return call(
+            function, path, *more, limit=PATIENCE * (1.0 + size / 200e6), memory=memory_for(size)
+        )  # fmt: skip
+    except MemoryError:
+        raise too_large(path) from None
+    except Died as error:
+        raise InputError(
+            f"{path} is damaged: {library} {error}; check that it is complete, or export it again"
+        ) from None
 
 
 def call(function: Callable[..., T], *arguments: Any, limit: float, memory: int = 0) -> T:

@@ -28,7 +28,7 @@ class Joints:
     Parameters
     ----------
     names : mapping of str to Name
-        What the name of every column says.
+        The parsed name of every column.
     """
 
     def __init__(self, names: Mapping[str, Name]) -> None:
@@ -84,9 +84,9 @@ class Joints:
         message = f"{role} may be any of {listed_names(candidates)}: the file has several axes"
         if role == "position" and drives and not driven and self.names[own[0].name].family.endswith("[]"):
             message += ", and its torque or current names none"
-            remedy = f"say which it belongs to with --map {role}=COLUMN"
+            remedy = f"choose the right one with --map {role}=COLUMN"
             return own, [Finding("error", "ambiguous-column", message, remedy=remedy)]
-        remedy = f"if another is meant, say --map {role}=COLUMN"
+        remedy = f"if another is meant, give --map {role}=COLUMN"
         return own, [
             Finding("warning", "ambiguous-column", f"{message}; axis {axis.upper()} was taken", remedy=remedy)
         ]
@@ -104,7 +104,7 @@ class Joints:
             level,
             "ambiguous-column",
             message,
-            remedy=f"say which with --map {role}=COLUMN, or --map {role}=none",
+            remedy=f"choose one with --map {role}=COLUMN, or none with --map {role}=none",
         )
 
 
@@ -119,7 +119,7 @@ def listed_names(columns: Sequence[Column]) -> str:
 
 
 def with_rates(columns: Sequence[Column], names: dict[str, Name]) -> dict[str, Name]:
-    """Return what the names say, with `qd` as the velocity if other names or the values show that it is one."""
+    """Return the parsed names, with `qd` as the velocity if other names or the values show that it is one."""
     symbols = {n: name.family.removesuffix("[]") for n, name in names.items()}
     unsure = [
         c

@@ -38,7 +38,7 @@ LAYOUTS = {
 
 
 def is_sysid(tree: Any) -> bool:
-    """Whether a JSON object holds at least two of the four tests."""
+    """Whether a JSON object contains at least two of the four tests."""
     if not isinstance(tree, Mapping):
         return False
     tests = cast("Mapping[Any, Any]", tree)
@@ -97,7 +97,7 @@ def _rows(path: Path, name: str, given: Sequence[Any]) -> Array:
         rows = np.empty(0)
     if given and (rows.ndim != 2 or rows.shape[1] not in LAYOUTS):
         raise InputError(
-            f"{path}: {name!r} is no table of numbers with 4, 9 or 10 columns; give the file that SysId wrote"
+            f"{path}: {name!r} is not a table of numbers with 4, 9 or 10 columns; give the file that SysId wrote"
         )
     return rows
 

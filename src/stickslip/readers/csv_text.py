@@ -104,7 +104,8 @@ def _in_groups(path: Path, lines: Sequence[str], layout: Layout) -> Table:
     }
     dialect = Dialect("\t", decimal, layout.width, layout.first, frozenset(words))
     rows, footer = _without_footer(["\t".join(cells) for cells in body], dialect)
-    values, odd = _padded(body[: len(rows)], dialect) or _values(rows, dialect)
+    padded = _padded(body[: len(rows)], dialect)
+    values, odd = _values(rows, dialect) if padded is None else (padded, [])
     clocks = [j for j in layout.starts if j in _clocks(rows, dialect)]
     channels, names, renamed = _column_groups.keyed_columns(layout, values, clocks)
     # The rows after the slower channels have ended are shorter.
@@ -120,22 +121,25 @@ def _in_groups(path: Path, lines: Sequence[str], layout: Layout) -> Table:
     return Table("csv", channels, _column_groups.project_lines(layout, lines), tuple(findings), unread)
 
 
-def _padded(body: Sequence[Sequence[str]], dialect: Dialect) -> tuple[Array, list[Finding]] | None:
-    """Return the cells as numbers, NaN where they are blank or absent; None if any is something else."""
+def _padded(body: Sequence[Sequence[str]], dialect: Dialect) -> Array | None:
+    """Return the cells as numbers, NaN where they are blank or absent; None if any may be something else."""
+    decimal, other = dialect.decimal, {".": ",", ",": "."}[dialect.decimal]
+    if any(other in c for row in body for c in row):  # between thousands
+        return None
     none = ["nan"] * dialect.width
     text = [
-        [c.replace(",", ".") if c and not c.isspace() else "nan" for c in row] + none[len(row) :]
+        [c.replace(decimal, ".") if c and not c.isspace() else "nan" for c in row] + none[len(row) :]
         for row in body
     ]
     try:
-        return np.array([row[: dialect.width] for row in text]).astype(np.float64), []
+        return np.array([row[: dialect.width] for row in text]).astype(np.float64)
     except ValueError:
         return None
 
 
 def _plain(path: Path, lines: Sequence[str]) -> Table:
     """Read a table with one row of names."""
-    dialect = _sniff(path, lines)
+    dialect = _sniff(lines)
     insist_on_columns(path, dialect.width)
     above = [line for line in lines[: dialect.start] if line.strip()]
     header = [dialect.split(COMMENT.sub("", line)) for line in above]
@@ -202,7 +206,7 @@ def _insist_on_short_lines(path: Path, lines: Sequence[str]) -> None:
         )
 
 
-def _sniff(path: Path, lines: Sequence[str]) -> Dialect:
+def _sniff(lines: Sequence[str]) -> Dialect:
     """The dialect under which most lines of a sample are rows of numbers of one width."""
     filled = [(i, line) for i, line in enumerate(lines) if line.strip()]
     longest = max((len(line) for _, line in filled), default=0)
@@ -215,9 +219,9 @@ def _sniff(path: Path, lines: Sequence[str]) -> Dialect:
         rows = [_is_row(cells, decimal) for cells in cut]
         if not any(rows):
             continue
-        width, count = _width(cut, rows)
+        width, explained = _width(cut, rows)
         # A second column is worth more than the last few rows.
-        merit = count * min(width, 3)
+        merit = explained * min(width, 3)
         if merit > score * 1.001:
             best, score = Dialect(delimiter, decimal, width, 0), merit
     if best is None:

@@ -18,7 +18,7 @@ from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers import _guard
 from stickslip.readers._flatten import table_of
-from stickslip.readers.limits import insist_on_columns, insist_on_values, memory_for, size_of, too_large
+from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Format, Table
 
 UNIT_KEYS = ("unit", "units", "Unit", "Units")
@@ -36,21 +36,7 @@ def read(path: Path) -> Table:
 
 def read_tree(path: Path, format_name: str, matlab: bool) -> Table:
     """Read the groups of an HDF5 file; `matlab` says that strings are stored as numbers."""
-    try:
-        return _guard.call(
-            _read_here,
-            path,
-            format_name,
-            matlab,
-            limit=_guard.patience(path),
-            memory=memory_for(size_of(path)),
-        )
-    except MemoryError:
-        raise too_large(path) from None
-    except _guard.Died as error:
-        raise InputError(
-            f"{path} is damaged: the HDF5 library {error}; check that it is complete, or export it again"
-        ) from None
+    return _guard.read_apart(_read_here, path, format_name, matlab, library="the HDF5 library")
 
 
 def _read_here(path: Path, format_name: str, matlab: bool) -> Table:

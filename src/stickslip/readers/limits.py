@@ -1,4 +1,4 @@
-"""How much is read from one file: bounds on its columns, its lines, and the values that it unpacks to.
+"""Limits on one file: its columns, its lines, and the values that it unpacks to.
 
 A small compressed file may unpack to more than the machine's memory. Readers therefore compare the sizes that a file
 declares with these bounds before they unpack it, on the command line, in Python and on the page alike.
@@ -28,7 +28,7 @@ def memory_for(size: int) -> int:
 
 
 def too_large(path: Path) -> InputError:
-    """The error of a file that takes more memory than `memory_for` while it is read, whatever it declares."""
+    """Return the error for a file that takes more memory than `memory_for` while it is read, whatever it declares."""
     size = size_of(path)
     return InputError(
         f"{path} has {size_text(size)} and needs more than {size_text(memory_for(size))} of memory to read; save it "

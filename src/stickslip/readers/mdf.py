@@ -14,7 +14,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.extras import needed
 from stickslip.readers import _guard
-from stickslip.readers.limits import insist_on_columns, insist_on_values, memory_for, size_of, too_large
+from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Column, Format, Table
 
 
@@ -26,12 +26,7 @@ def recognise(head: bytes, path: Path) -> bool:
 def read(path: Path) -> Table:
     """Every channel of numbers with its unit and the clock of its group."""
     needed("asammdf", "mdf", "MDF files need")
-    try:
-        return _guard.call(_read_here, path, limit=_guard.patience(path), memory=memory_for(size_of(path)))
-    except MemoryError:
-        raise too_large(path) from None
-    except _guard.Died as error:
-        raise InputError(f"{path} is damaged: asammdf {error}; export it again") from None
+    return _guard.read_apart(_read_here, path, library="asammdf")
 
 
 def _read_here(path: Path) -> Table:

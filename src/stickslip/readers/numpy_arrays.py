@@ -62,7 +62,7 @@ def insist_on_arrays(path: Path) -> None:
 
 
 def _values(file: IO[bytes]) -> int:
-    """How many values the array has that begins here; 0 where none does. A text of n letters counts as n."""
+    """Return the number of values of the array that starts here; 0 if none does. A text of n letters counts as n."""
     if file.read(len(NPY)) != NPY:
         return 0
     major, _ = file.read(2)

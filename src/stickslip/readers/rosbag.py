@@ -17,7 +17,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.extras import needed
 from stickslip.readers import _guard
-from stickslip.readers.limits import insist_on_columns, insist_on_values, memory_for, size_of, too_large
+from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Column, Format, Table
 
 MAX_ELEMENTS = 64
@@ -39,12 +39,7 @@ def read(path: Path) -> Table:
     if path.is_dir():
         _insist_on_own_files(path)
     needed("rosbags.highlevel", "rosbag", "ROS bags need")
-    try:
-        return _guard.call(_read_here, path, limit=_guard.patience(path), memory=memory_for(size_of(path)))
-    except MemoryError:
-        raise too_large(path) from None
-    except _guard.Died as error:
-        raise InputError(f"{path} is damaged: rosbags {error}; check that it is complete") from None
+    return _guard.read_apart(_read_here, path, library="rosbags")
 
 
 def _insist_on_own_files(folder: Path) -> None:

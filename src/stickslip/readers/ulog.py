@@ -10,12 +10,12 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from struct import unpack_from
-from typing import Any
 
 import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.readers._packed import Damaged, Member, columns_of, cut_off, dtype_of, members_of
 from stickslip.readers.limits import insist_on_columns
 from stickslip.readers.table_columns import Column, Format, Table
 
@@ -25,25 +25,14 @@ TYPES = {
     "int8_t": "i1", "uint8_t": "u1", "int16_t": "<i2", "uint16_t": "<u2", "int32_t": "<i4", "uint32_t": "<u4",
     "int64_t": "<i8", "uint64_t": "<u8", "float": "<f4", "double": "<f8", "bool": "?", "char": "S1",
 }  # fmt: skip
-FIELD = re.compile(r"(\w+)(?:\[(\d+)\])?\s+(\w+)")
-DEPTH = 8
-"""Levels of messages in messages."""
-MAX_ELEMENTS = 1024
-"""Values of one message."""
+FIELD = re.compile(r"(?P<kind>\w+)(?:\[(?P<count>\d+)\])?\s+(?P<member>\w+)")
 APPENDED = 1
-"""The one flag of the first byte of incompatible flags that is known: data were appended after a crash."""
-
-Member = tuple[str, str]
-"""Suffix of the column, and type."""
-
-
-class Damaged(ValueError):
-    """What in the file breaks the format."""
+"""The known incompatible flag: data were appended after a crash."""
 
 
 @dataclass
 class _Topic:
-    """A subscription: its name in columns, the layout of its samples, and these."""
+    """A subscription: its name in columns, the layout of its samples, and the samples."""
 
     name: str
     members: list[Member]
@@ -66,7 +55,7 @@ def read(path: Path) -> Table:
         columns += _columns(topic)
         insist_on_columns(path, len(columns))
     message = (
-        "a ULog file holds the topics of a vehicle, and its torque setpoints are normalised to -1 ... 1: no field is "
+        "a ULog file has the topics of a vehicle, and its torque setpoints are normalised to -1 ... 1: no field is "
         "taken as a channel by its name"
     )
     remedy = "map the fields of one axis, such as --map velocity=esc_status.esc[0].esc_rpm:rpm"
@@ -87,10 +76,7 @@ def _topics(content: bytes) -> tuple[list[_Topic], dict[str, float | str], list[
         size, kind = unpack_from("<HB", content, at)
         body = content[at + 3 : at + 3 + size]
         if len(body) < size:
-            message = f"the file is cut off after {at} of {len(content)} bytes; what comes before was read"
-            findings.append(
-                Finding("warning", "cut-off", message, remedy="download it again if it was copied")
-            )
+            findings.append(cut_off(at, len(content)))
             break
         letter = chr(kind)
         if letter == "B" and size >= 16 and (body[8] & ~APPENDED or any(body[9:16])):
@@ -100,7 +86,9 @@ def _topics(content: bytes) -> tuple[list[_Topic], dict[str, float | str], list[
             formats[name] = fields
         elif letter == "A" and size > 3:
             name = body[3:].decode("utf-8", "replace")
-            topic = _Topic(name if body[0] == 0 else f"{name}.{body[0]}", _members(name, formats, DEPTH))
+            topic = _Topic(
+                name if body[0] == 0 else f"{name}.{body[0]}", members_of(name, formats, FIELD, TYPES)
+            )
             by_id[unpack_from("<H", body, 1)[0]] = topic
             topics.append(topic)
         elif letter == "D" and size > 2 and (topic := by_id.get(unpack_from("<H", body)[0])) is not None:
@@ -123,30 +111,13 @@ def _constant(body: bytes, constants: dict[str, float | str]) -> None:
     length = body[0] if body else 0
     match = FIELD.fullmatch(body[1 : 1 + length].decode("utf-8", "replace"))
     value = body[1 + length :]
-    if match is None or match[1] not in TYPES:
+    kind = TYPES.get(match["kind"]) if match else None
+    if match is None or kind is None:
         return
-    if match[1] == "char":
-        constants.setdefault(match[3], value.decode("utf-8", "replace"))
-    elif not match[2] and len(value) == np.dtype(TYPES[match[1]]).itemsize:
-        constants.setdefault(match[3], float(np.frombuffer(value, TYPES[match[1]])[0]))
-
-
-def _members(name: str, formats: dict[str, str], depth: int) -> list[Member]:
-    """Suffix and type of every value of a message; nothing where its layout is not known."""
-    out: list[Member] = []
-    for declaration in formats.get(name, "").split(";") if depth else ():
-        if not declaration.strip():
-            continue
-        match = FIELD.fullmatch(declaration.strip())
-        count = int(match[2] or 1) if match else 0
-        if match is None or count > MAX_ELEMENTS:
-            return []
-        inner = [("", TYPES[match[1]])] if match[1] in TYPES else _members(match[1], formats, depth - 1)
-        if not inner or len(out) + count * len(inner) > MAX_ELEMENTS:
-            return []
-        index = [f"[{i}]" if match[2] else "" for i in range(count)]
-        out += [(f".{match[3]}{i}{suffix}", code) for i in index for suffix, code in inner]
-    return out
+    if kind == "S1":
+        constants.setdefault(match["member"], value.decode("utf-8", "replace"))
+    elif not match["count"] and len(value) == np.dtype(kind).itemsize:
+        constants.setdefault(match["member"], float(np.frombuffer(value, kind)[0]))
 
 
 def _columns(topic: _Topic) -> list[Column]:
@@ -154,18 +125,15 @@ def _columns(topic: _Topic) -> list[Column]:
     members = list(topic.members)
     while members and "._padding" in members[-1][0]:
         members.pop()
-    layout: np.dtype[Any] = np.dtype([(f"f{i}", code) for i, (_, code) in enumerate(members)])
+    layout = dtype_of(members)
     whole = [sample[: layout.itemsize] for sample in topic.samples if len(sample) >= layout.itemsize]
     suffixes = [suffix for suffix, _ in members]
     if not whole or ".timestamp" not in suffixes:
         return []
     rows = np.frombuffer(b"".join(whole), dtype=layout)
     clock = rows[f"f{suffixes.index('.timestamp')}"].astype(np.float64) * 1e-6
-    return [
-        Column(topic.name + suffix, rows[f"f{i}"].astype(np.float64), "", clock, "none")
-        for i, (suffix, code) in enumerate(members)
-        if suffix != ".timestamp" and "._padding" not in suffix and code != "S1"
-    ]
+    columns = columns_of(topic.name, members, rows, clock, channel="none")
+    return [c for c in columns if c.name != f"{topic.name}.timestamp" and "._padding" not in c.name]
 
 
 FORMAT = Format("ulog", "PX4 ULog", (".ulg",), recognise, read)

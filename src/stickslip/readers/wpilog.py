@@ -18,6 +18,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.readers._packed import MAX_ELEMENTS, Damaged, Member, columns_of, cut_off, dtype_of, members_of
 from stickslip.readers.limits import insist_on_columns
 from stickslip.readers.table_columns import Column, Format, Table
 
@@ -28,16 +29,13 @@ NUMBERS = {"boolean": "?", "int64": "<i8", "float": "<f4", "double": "<f8"}
 FIELDS = {
     "bool": "?", "int8": "i1", "int16": "<i2", "int32": "<i4", "int64": "<i8", "uint8": "u1", "uint16": "<u2",
     "uint32": "<u4", "uint64": "<u8", "float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8",
+    "char": "S1",
 }  # fmt: skip
 DECLARATION = re.compile(
-    r"(?:(?:enum\s*)?\{[^}]*\}\s*)?([^\s\[\]:;]+)\s+([^\s\[\]:;]+)\s*(?:\[\s*(\d+)\s*\])?"
+    r"(?:(?:enum\s*)?\{[^}]*\}\s*)?(?P<kind>[^\s\[\]:;]+)\s+(?P<member>[^\s\[\]:;]+)\s*(?:\[\s*(?P<count>\d+)\s*\])?"
 )
 """One member of a struct; a bit field, which has a colon, does not match."""
 SCHEMA = "/.schema/struct:"
-DEPTH = 8
-"""Levels of structs in structs."""
-MAX_ELEMENTS = 1024
-"""Values of one sample: an array with more is a picture, not signals."""
 UNIT_NAMES = {
     "volt": "V", "volts": "V", "ampere": "A", "amp": "A", "amps": "A", "meter": "m", "meters": "m", "foot": "ft",
     "feet": "ft", "inch": "in", "inches": "in", "rotation": "rev", "rotations": "rev", "radian": "rad",
@@ -46,10 +44,6 @@ UNIT_NAMES = {
 }  # fmt: skip
 """Names of WPILib's units, in lower case, and how they are written here."""
 PER = {"second": "s", "minute": "min"}
-
-
-class Damaged(ValueError):
-    """What in the file breaks the format."""
 
 
 @dataclass
@@ -75,9 +69,7 @@ def read(path: Path) -> Table:
         entries, cut = _entries(content)
     except Damaged as error:
         raise InputError(f"{path} is not a WPILib log that can be read: {error}; download it again") from None
-    findings = (
-        [Finding("warning", "cut-off", cut, remedy="download it again if it was copied")] if cut else []
-    )
+    findings = [cut_off(cut, len(content))] if cut else []
     schemas = {e.name.removeprefix(SCHEMA): _text(e.samples[-1]) for e in entries
                if e.name.startswith(SCHEMA) and e.samples}  # fmt: skip
     columns: list[Column] = []
@@ -95,19 +87,19 @@ def read(path: Path) -> Table:
     if unread:
         names = ", ".join(repr(name) for name in list(unread)[:4]) + (", ..." if len(unread) > 4 else "")
         message = (
-            f"{len(unread)} entries hold no numbers, or arrays of changing length, and were left out: {names}"
+            f"{len(unread)} entries have no numbers, or arrays of changing length, and were left out: {names}"
         )
         findings.append(Finding("note", "not-read", message))
     return Table("wpilog", tuple(columns), findings=tuple(findings), unread=unread)
 
 
-def _entries(content: bytes) -> tuple[list[_Entry], str]:
-    """The entries with their samples, one a name, and where the file is cut off, in words."""
+def _entries(content: bytes) -> tuple[list[_Entry], int]:
+    """Return the entries with their samples, one a name, and the byte at which the file is cut off (0: it is whole)."""
     if len(content) < HEADER or content[7] != 1:
         raise Damaged("its version is not 1" if len(content) >= HEADER else "it ends in its header")
     by_id: dict[int, _Entry] = {}
     by_name: dict[tuple[str, str], _Entry] = {}
-    cut = ""
+    cut = 0
     at = HEADER + int.from_bytes(content[8:12], "little")
     for number, time, payload in _records(content, at):
         if number == 0:
@@ -116,7 +108,7 @@ def _entries(content: bytes) -> tuple[list[_Entry], str]:
             by_id[number].times.append(time)
             by_id[number].samples.append(payload)
         elif number == -1:
-            cut = f"the file is cut off after {time} of {len(content)} bytes; what comes before was read"
+            cut = time
     if not by_name:
         raise Damaged("it has no entries")
     return list(by_name.values()), cut
@@ -132,7 +124,7 @@ def _records(content: bytes, at: int) -> Iterator[tuple[int, int, bytes]]:
         time_end = size_end + 1 + (bits >> 4 & 7)
         size = int.from_bytes(content[entry_end:size_end], "little")
         if time_end + size > end:
-            # A robot that is switched off leaves zeros or half a record at the end.
+            # The log of a robot that is switched off ends in zeros or half a record.
             if any(content[at:]):
                 yield -1, at, b""
             return
@@ -180,34 +172,29 @@ def _text(data: bytes) -> str:
 
 
 def _columns(entry: _Entry, schemas: dict[str, str]) -> list[Column]:
-    """The columns of an entry; none where it does not hold the same count of numbers in every sample."""
+    """Return the columns of an entry; an empty list if its samples differ in size."""
     sizes = {len(sample) for sample in entry.samples}
     if len(sizes) != 1:
         return []
     members = _members(entry.kind, max(sizes), schemas)
-    layout = np.dtype([(f"f{i}", code) for i, (_, code) in enumerate(members)])
+    layout = dtype_of(members)
     if not members or layout.itemsize not in sizes:
         return []
     order = np.argsort(np.array(entry.times, dtype=np.int64), kind="stable")
     clock = 1e-6 * np.array(entry.times, dtype=np.float64)[order]
     rows = np.frombuffer(b"".join(entry.samples), dtype=layout)[order]
-    unit = _unit(entry.metadata)
     # Poses and speeds of the robot: an x of a struct is no position of an axis.
     channel = "none" if entry.kind.startswith("struct:") else ""
-    return [
-        Column(entry.name + suffix, rows[f"f{i}"].astype(np.float64), unit, clock, channel)
-        for i, (suffix, code) in enumerate(members)
-        if not code.startswith("S")
-    ]
+    return columns_of(entry.name, members, rows, clock, _unit(entry.metadata), channel)
 
 
-def _members(kind: str, size: int, schemas: dict[str, str]) -> list[tuple[str, str]]:
-    """Suffix of the column and type of every value in a sample of `size` bytes; nothing where these are not known."""
+def _members(kind: str, size: int, schemas: dict[str, str]) -> list[Member]:
+    """Return suffix and type of every value in a sample of `size` bytes; an empty list if they are not known."""
     base, several = kind.removesuffix("[]"), kind.endswith("[]")
     if base in NUMBERS:
         inner = [("", NUMBERS[base])]
     elif base.startswith("struct:"):
-        inner = _of_struct(base.removeprefix("struct:"), schemas, DEPTH)
+        inner = members_of(base.removeprefix("struct:"), schemas, DECLARATION, FIELDS)
     else:
         return []
     width = sum(np.dtype(code).itemsize for _, code in inner)
@@ -215,30 +202,6 @@ def _members(kind: str, size: int, schemas: dict[str, str]) -> list[tuple[str, s
     if count * len(inner) > MAX_ELEMENTS:
         return []
     return [(f"[{i}]{suffix}" if several else suffix, code) for i in range(count) for suffix, code in inner]
-
-
-def _of_struct(name: str, schemas: dict[str, str], depth: int) -> list[tuple[str, str]]:
-    """Suffix and type of every value in a struct; nothing where its layout is not known."""
-    out: list[tuple[str, str]] = []
-    if depth == 0:
-        return out
-    for declaration in schemas.get(name, "").split(";"):
-        if not declaration.strip():
-            continue
-        match = DECLARATION.fullmatch(declaration.strip())
-        count = int(match[3] or 1) if match else 0
-        if match is None or count > MAX_ELEMENTS:
-            return []
-        kind, member = match[1], match[2]
-        if kind == "char":
-            out.append((f".{member}", f"S{count}"))
-            continue
-        inner = [("", FIELDS[kind])] if kind in FIELDS else _of_struct(kind, schemas, depth - 1)
-        if not inner or len(out) + count * len(inner) > MAX_ELEMENTS:
-            return []
-        index = [f"[{i}]" if match[3] else "" for i in range(count)]
-        out += [(f".{member}{i}{suffix}", code) for i in index for suffix, code in inner]
-    return out
 
 
 def _unit(metadata: str) -> str:

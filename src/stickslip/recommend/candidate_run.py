@@ -68,7 +68,7 @@ class Drive:
     sample_time : float
         s
     sample_time_from : str
-        For people: where that is from; empty where nobody needs to be told.
+        Source of that resolution, for people; empty if it need not be reported.
     encoder_counts : float
         Per revolution (2 pi); 0 measures exactly.
     encoder_from : str

@@ -79,7 +79,7 @@ class Setting:
 
     @property
     def words(self) -> str:
-        """What is switched on, in words."""
+        """Return the setting in words."""
         if not self.compensates:
             return "inertia feedforward alone, without friction compensation"
         return f"{self.kind} of law {self.law!r}, gain {self.gain:g}"
@@ -267,7 +267,7 @@ class Bench:
         return Candidate(setting, tuple(errors), (), HARDLY if max(errors) > WORTH else "")
 
     def every(self, setting: Setting) -> Iterator[tuple[float, tuple[str, ...]]]:
-        """The part of the error that is left, and why it is not safe, on one axis after the other."""
+        """Yield the part of the error left, and the reasons why the setting is not safe, axis by axis."""
         controller = setting.on(self.linear, self.laws[setting.law])
         for i, (before, after) in enumerate(self.trials(controller)):
             if isinstance(after, str) or isinstance(before, str):

@@ -1,4 +1,4 @@
-"""What the user must know of the motion: whose it is, where it jumps, and what the error along it depends on."""
+"""Notes on the motion: its source, its jumps, and the attribute on which the error left depends most."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def on_motion(drive: Drive, angle: str) -> Iterator[str]:
 
 
 def _at_jumps(drive: Drive) -> str:
-    """What the reference velocity is where the position jumps."""
+    """Return the reference velocity that is simulated at jumps of the position, in words."""
     if drive.reference_velocity == "difference":
         return "The drive differentiates it: the jump of the reference velocity is simulated."
     return (

@@ -28,7 +28,7 @@ UNSURE = f"no certain reduction (more than {100.0 / ALLOWANCE:.0f} % left)"
 
 
 def sampled_as(drive: Drive, chosen: Candidate | None, linear: bool = False) -> Iterator[str]:
-    """The sample time, the encoder and the reference velocity that all of this holds for, and where they are from."""
+    """Yield the sample time, encoder and reference velocity of the simulations, and their sources."""
     if drive.sample_time_from:
         yield f"Simulated with a sample time of {drive.sample_time:g} s, {drive.sample_time_from}."
     if drive.encoder_from:
@@ -42,7 +42,7 @@ def sampled_as(drive: Drive, chosen: Candidate | None, linear: bool = False) -> 
 
 
 def _reference_velocity(drive: Drive) -> str:
-    """How the drive forms its reference velocity in the simulations."""
+    """Return how the drive forms its reference velocity in the simulations, in words."""
     if drive.reference_velocity == "difference":
         return (
             "Simulated with a reference velocity that is the difference of two reference positions, as given."
@@ -117,7 +117,7 @@ def weak_on(plants: Sequence[RigidAxis], drive: Drive) -> str:
 
 
 def notes_on(found: Identified, result: Recommendation, weak: str = "") -> Iterator[str]:
-    """What the user must know of the model and of what is recommended; `weak` as of `weak_on`."""
+    """Yield the notes on the model and on the recommendation; `weak` is from `weak_on`."""
     chosen, candidates = result.chosen, result.candidates
     if weak:
         limit = "the torque limit of the drive lies below their friction"
@@ -141,7 +141,7 @@ def notes_on(found: Identified, result: Recommendation, weak: str = "") -> Itera
 
 
 def interval_allows(found: Identified, result: Recommendation) -> Iterator[str]:
-    """What was simulated, and how the interval allows for the rest, where something is recommended."""
+    """Yield what was simulated and how the interval allows for the rest, if something is recommended."""
     if result.chosen is not None or result.instead is not None:
         yield _simulated(result.drive.machine, found.train, result.drive.delay)
 
@@ -174,7 +174,7 @@ def _intervals(found: Identified, unknown: Sequence[str]) -> Iterator[str]:
 
 
 def beyond_inertia(chosen: Candidate | None, friction: Candidate | None, why: str) -> Iterator[str]:
-    """Why friction is not compensated in addition to the inertia feedforward, where that alone is switched on.
+    """Explain why friction is not compensated, if the inertia feedforward alone is switched on.
 
     `why` is the reason where no friction compensation may be switched on.
     """
@@ -191,7 +191,7 @@ def beyond_inertia(chosen: Candidate | None, friction: Candidate | None, why: st
 
 
 def _left(candidate: Candidate) -> str:
-    """The part of the error left, in words."""
+    """Return the part of the error left, in words."""
     worst = f"{100.0 * candidate.worst:.1f} % of the error on the worst axis"
     usual = f" and at most {100.0 * candidate.usual:.1f} % on half of them"
     return worst + (usual if len(candidate.errors) > 2 else "")

@@ -162,8 +162,7 @@ def recommend(
 
 
 def _reasons(found: Identified, result: Recommendation, bench: Bench, others: Bench) -> Iterator[str]:
-    """What the error left by the recommended setting depends on; or the one reason why nothing is recommended, or why
-    no friction is compensated."""
+    """Yield the attribute on which the error left depends, or the reason against compensation (of friction)."""
     chosen = result.switched_on
     if result.why_none:
         yield f"No compensator is recommended: {result.why_none}."

@@ -120,7 +120,7 @@ class Recommendation:
 
     @property
     def confirmed_on(self) -> int:
-        """How many drawn axes what is recommended was confirmed on."""
+        """Number of drawn axes on which the recommendation was confirmed."""
         return max(len(self._errors) - 1, 0)
 
     @property

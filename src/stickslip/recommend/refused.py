@@ -1,4 +1,4 @@
-"""The one reason for which no compensator is recommended, with its numbers, and what the user can do about it.
+"""Reason why no compensator is recommended, with its numbers and the remedy.
 
 The candidate that comes closest decides: the best one that was refused when it was confirmed, else the one that passes
 most axes. It is run on every sampled axis, and the attribute that separates the refused axes is named.
@@ -24,12 +24,11 @@ REMEDIES = {
     HUNTS: "lower the integral gain, or hold the integral while the error is small",
     LEFT: "check the gains of the loop and the inertia (--inertia)",
 }  # fmt: skip
-"""What to do about each reason."""
+"""Remedy, by reason."""
 NOT_FRICTION = (
     "most of the error left is not caused by the friction of the model; leave compensation off, or give the motion "
     "that matters (--motion)"
 )
-
 NARROWER = "identify a record that narrows the intervals of the model (measure_next in its file)"
 
 
@@ -58,7 +57,7 @@ def why_refused(found: Identified, candidates: Sequence[Candidate], bench: Bench
         return f"the closest candidate ({name}) is refused on the best estimate already: {_on_one(best)}"
     plants, errors, unsafe = on_every_axis(setting, bench, others)
     bad = [_bad(e, u) for e, u in zip(errors, unsafe, strict=True)]
-    if not any(bad):  # What decided is judged otherwise: a long rest after the motion.
+    if not any(bad):  # Refused for another reason: the long rest after the motion.
         said = best.refused[0]
         return f"the closest candidate ({name}) {said}; {remedy_of(said)}"
     kinds = [word for u in unsafe for word in u]
@@ -93,12 +92,12 @@ def remedy_of(reason: str) -> str:
 
 
 def _bad(error: float, unsafe: Sequence[str]) -> bool:
-    """Whether a setting is not to be switched on for what it does on an axis."""
+    """Whether the result on one axis forbids a setting."""
     return bool(unsafe) or ALLOWANCE * error > 1.0
 
 
 def _guarded(best: Candidate) -> str:
-    """That the setting is refused with more than its own gain."""
+    """Return the gain at which the setting is refused, if it is not its own; else an empty text."""
     decided = best.refused_as
     if decided is None or decided.gain == best.setting.gain:
         return ""
@@ -106,7 +105,7 @@ def _guarded(best: Candidate) -> str:
 
 
 def _on_one(best: Candidate) -> str:
-    """What it does on the best estimate."""
+    """Return the result on the best estimate, and the remedy."""
     error = best.errors[0]
     left = "" if math.isinf(error) else f", {100.0 * error:.1f} % of the error left"
     if best.unsafe:

@@ -1,4 +1,4 @@
-"""The resolution of the drive's encoder, and where it is from: given, the machine's, the controller's, the record's."""
+"""Resolution of the drive's encoder, and its source: the user, the machine, the controller or the record."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OWN = "give --counts-per-rev (Python: counts_per_rev=)"
 def encoder_for(
     found: Identified, given: float | None, machine: Machine | None = None, controller: float = 0.0
 ) -> tuple[float, str]:
-    """Return the counts of the encoder per revolution (of a linear axis per 2 pi m; 0: exact), and where they are from.
+    """Return the counts of the encoder per revolution (of a linear axis per 2 pi m; 0: exact), and their source.
 
     Parameters
     ----------
@@ -24,14 +24,14 @@ def encoder_for(
     given : float, optional
         Counts that the user states.
     machine : Machine, optional
-        At hand.
+        Machine that is simulated.
     controller : float
         Counts that the controller of the user's file or object has; 0: none.
 
     Raises
     ------
     InputError
-        If the given number is no number of counts.
+        If the given number is not a number of counts.
     """
     if given is not None:
         if not (given == 0.0 or 1.0 <= given < math.inf):

@@ -23,7 +23,7 @@ from stickslip.machines.two_mass import TwoMassAxis
 from stickslip.recommend.plant import Plant
 
 LEVEL = 0.05
-"""Probability at most that chance alone separates some attribute so well (Bonferroni over all of them)."""
+"""Significance level: probability that chance alone separates some attribute as well (Bonferroni over all of them)."""
 REFERENCE_VELOCITY = "reference velocity"
 
 
@@ -36,7 +36,7 @@ class Attribute:
     name, unit : str
         In words; the unit is that of the axis.
     remedy : str
-        What the user can do about it.
+        Action that the user can take.
     """
 
     name: str
@@ -68,7 +68,7 @@ class Separation:
     axes: tuple[int, int]
 
     def side(self, above: bool) -> str:
-        """The axes on one side of the threshold, in words."""
+        """Return the axes on one side of the threshold, in words."""
         a = self.attribute
         if a.name == REFERENCE_VELOCITY:
             return f"whose drive forms its reference velocity {self._formed(above)}"
@@ -77,7 +77,7 @@ class Separation:
 
     @property
     def remedy(self) -> str:
-        """What the user can do."""
+        """Return what the user can do."""
         if self.attribute.name != REFERENCE_VELOCITY:
             return self.attribute.remedy
         good = "instant" if self.above else "difference"
@@ -87,14 +87,14 @@ class Separation:
         )
 
     def _formed(self, difference: bool) -> str:
-        """How a drive forms its reference velocity, in words."""
+        """Return how a drive forms its reference velocity, in words."""
         return (
             "as the difference of two reference positions" if difference else "at the instant of the sample"
         )
 
     @property
     def words(self) -> str:
-        """Which axes are refused, in a clause."""
+        """Return which axes are refused, in a clause."""
         (here, there), (n, m) = self.refused, self.axes
         return f"they are {here} of the {n} axes {self.side(self.above)}, and {there} of the {m} others"
 
@@ -187,7 +187,7 @@ def dependence(
 ) -> tuple[Separation, float, float] | None:
     """Return the attribute on which the error left depends most, with the median errors on its worse and better side.
 
-    None where both medians are within `factor`.
+    None if the ratio of both medians is at most `factor`.
 
     Parameters
     ----------

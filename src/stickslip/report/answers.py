@@ -312,8 +312,10 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
     if isinstance(regression, Regression):
         out += around(regression, found)
     if (rms := found.misfit.get("rms_N" if linear(found) else "rms_Nm")) is not None:
-        what = f"{'force' if linear(found) else 'torque'}: {quantity(float(rms), unit_in(found, 'N·m'))}"
-        out.append(f"What the curve leaves of the {what} root mean square.")
+        what = "force" if linear(found) else "torque"
+        out.append(
+            f"Residual {what} of the curve: {quantity(float(rms), unit_in(found, 'N·m'))} root mean square."
+        )
     return out
 
 

@@ -128,7 +128,7 @@ def beside_lines(result: Recommendation) -> list[str]:
 
 
 def instead_lines(result: Recommendation, taken: Beside) -> list[str]:
-    """What is switched on where it is a compensator of the catalogue, what it leaves, and what it has learned."""
+    """Describe the compensator of the catalogue that is switched on: the error left, and what it has learned."""
     said = (
         f"it leaves at most {100 * taken.at_most:.1f} % of the linear controller's error on all sampled axes, up to "
         f"{100 * min(ALLOWANCE * taken.at_most, 1.0):.1f} % with what is not simulated"

@@ -1,8 +1,8 @@
-"""The time that a call may take which the loop waits for, and what is done when it takes more.
+"""Time budget of the calls that the loop waits for, and the stop when a call exceeds it.
 
-A controller in Python or a rig that is a little late now and then does no harm; one that falls ever further behind, or
-does not come back, leaves its last torque on the axis. How far it is behind the clock is summed up, and beyond its
-budget the loop stops. A thread watches the calls under way, and stops the rig while a call does not come back.
+A controller in Python or a rig may be slightly delayed now and then. If it falls further behind, or does not return,
+its last torque stays on the axis. The delay is accumulated, and the loop stops when it exceeds the budget. A thread
+watches the running calls, and stops the rig if a call does not return.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Budget:
         self._lock = threading.Lock()
 
     def call(self, function: Callable[P, Result], *args: P.args, **kwargs: P.kwargs) -> Result:
-        """What a function returns.
+        """Call a function, and return its result.
 
         Raises
         ------

@@ -51,7 +51,7 @@ NMT = {0x02: "stop", 0x80: "enter pre-operational", 0x81: "reset node", 0x82: "r
 
 
 def interference(service: int, data: bytes, node: int) -> str:
-    """What a frame of another node means for the run of this one, by its 11-bit identifier; empty: nothing."""
+    """Return how a frame of another node interferes with this run, by its 11-bit identifier; empty if it does not."""
     if service == 0x80:
         return "another device sends SYNC on this bus: two masters cannot share it"
     if service == 0x200 + node:

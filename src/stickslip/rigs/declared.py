@@ -61,7 +61,7 @@ def blamed(rig: Rig, doing: str) -> Generator[None]:
 
 
 def last_resort(rig: Rig) -> str:
-    """What takes the torque away where the loop cannot."""
+    """Return what removes the torque if the loop cannot, in words."""
     watchdog = rig.capabilities.watchdog
     if watchdog is None:
         return "it declares no watchdog: switch its power off"

@@ -63,8 +63,8 @@ class Settings:
     reset_fault : bool
         Reset a fault that the drive shows when it is opened.
     timeout : float
-        How long the answer to a SYNC is waited for, s: so much later is a lost one known, and the stop begun. The
-        limit ``answer_time`` is at least twice as long.
+        How long to wait for the answer to a SYNC, s. The stop starts this long after a lost answer. The limit
+        ``answer_time`` is at least twice as long.
     """
 
     bus: Mapping[str, Any]
@@ -411,7 +411,7 @@ class Ds402:
         return None
 
     def _mode_of(self, data: bytes) -> str:
-        """What is wrong with the drive's answer about its mode of operation; answers to others are theirs."""
+        """Return the fault in the drive's answer about its mode of operation; empty if there is none."""
         if len(data) < 5 or data[1:4] != cia.MODE_QUESTION[1:4]:
             return ""
         if data[0] == cia.ABORT:

@@ -123,7 +123,7 @@ class Guard:
         return True
 
     def end_ramp(self) -> bool:
-        """The torque is zero: a controller that goes on begins without torque. Whether nothing went wrong meanwhile."""
+        """Note that the torque is zero, and return whether no fault has occurred meanwhile."""
         if self._safety["reason"] != NONE:
             self._safety["state"] = STOPPED
             return False
@@ -198,35 +198,28 @@ def clock_fault(rig: str, step: float, where: str) -> MeasurementFault:
 
 
 def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] | None:
-    """What is not as expected of a rig's answer (`stickslip.rigs.safety`), and the remedy; None for other reasons."""
+    """Return the fault in a rig's answers (`stickslip.rigs.safety`) and its remedy; None for other reasons."""
     waited = f"for {limits.answer_time:g} s (limit answer_time)"
-    wiring = (
-        "check the current loop, the sign and the torque constant; a rig that measures no torque returns NaN"
-    )
-    match reason:
-        case _ if reason == STILL:
-            return (
-                f"the position has not changed {waited} under {value:.4g} N·m, which must move the axis",
-                "check encoder, brake and end stops; if it may stand still under this torque, set a greater "
-                "standstill_torque in [rig.limits]",
-            )
-        case _ if reason == FROZEN:
-            return (
-                f"no reading has changed {waited} while the torque command did",
-                "check the connection: the rig repeats an old measurement",
-            )
-        case _ if reason == IGNORED:
-            return (
-                f"the measured torque, {value:.4g} N·m on average, does not follow the command {waited}",
-                wiring,
-            )
-        case _ if reason == OPPOSED:
-            return (
-                f"the torque sensor reads {value:.4g} N·m against the torque with which the motor drives the axis",
-                "invert the sensor's sign",
-            )
-        case _:
-            return None
+    found = {
+        STILL: (
+            f"the position has not changed {waited} under {value:.4g} N·m, which must move the axis",
+            "check encoder, brake and end stops; if it may stand still under this torque, set a greater "
+            "standstill_torque in [rig.limits]",
+        ),
+        FROZEN: (
+            f"no reading has changed {waited} while the torque command did",
+            "check the connection: the rig repeats an old measurement",
+        ),
+        IGNORED: (
+            f"the measured torque, {value:.4g} N·m on average, does not follow the command {waited}",
+            "check the current loop, the sign and the torque constant; a rig that measures no torque returns NaN",
+        ),
+        OPPOSED: (
+            f"the torque sensor reads {value:.4g} N·m against the torque with which the motor drives the axis",
+            "invert the sensor's sign",
+        ),
+    }
+    return found.get(reason)
 
 
 def told(fault: BaseException) -> BaseException:

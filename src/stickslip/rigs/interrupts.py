@@ -5,7 +5,7 @@ in no other thread, and one that nobody hears ends the process at once. A loop i
 system call a compiled handler; when its torque is zero and its record closed, the signal is sent once more, to whom it
 would have gone. All loops of a process hear the same signal.
 
-Some signals cannot be heard, so that only the drive's watchdog takes the torque away: SIGKILL and SIGSTOP, which the
+Some signals cannot be handled, therefore only the drive's watchdog removes the torque: SIGKILL and SIGSTOP, which the
 system gives to no program, and those of a crash (`CRASHES`), after which no code can be relied on.
 """
 
@@ -33,8 +33,8 @@ CRASHES = ("SIGSEGV", "SIGBUS", "SIGILL", "SIGFPE")
 NEVER = ("SIGKILL", "SIGSTOP", *CRASHES, "SIGCHLD", "SIGCONT", "SIGURG", "SIGWINCH")
 """Not heard: these cannot be, or neither end nor halt the process."""
 TERMINAL = ("SIGTTIN", "SIGTTOU")
-"""Of a background process that uses its terminal: once heard they are ignored, or the same call would raise them again
-without end"""
+"""Signals of a background process that uses its terminal. After the first they are ignored, since the same call would
+raise them forever."""
 
 
 class Signals:

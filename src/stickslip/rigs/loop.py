@@ -479,7 +479,7 @@ class Loop:
             raise self._error(self._open_stream())
 
     def _error(self, stream: Stream) -> BaseException:
-        """What is raised once the torque is zero, as far as the rig has taken that."""
+        """Return the error to raise once the torque command is zero, with a warning if the rig has not answered it."""
         error = self._guard.error(self.rig.name, self.limits, stream)
         if not self._answered and isinstance(error, RigError):
             self._answered = True  # reported

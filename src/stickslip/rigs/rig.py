@@ -33,7 +33,7 @@ LIMIT_UNITS = {
 }  # fmt: skip
 """Limits by their names in messages"""
 STANDSTILL = 0.8
-"""Of the torque limit: the largest break-away torque that the stages of a commissioning can exceed by a quarter"""
+"""Share of the torque limit: the largest break-away torque that a commissioning can exceed by a quarter."""
 
 
 class Measurement(NamedTuple):
@@ -132,10 +132,10 @@ class Limits:
         torque falls by ``torque / stop_time``, so a smaller torque is gone sooner.
     answer_time : float
         How long the rig may be without a plausible answer, s (`stickslip.rigs.safety`): `Rig.exchange` takes longer
-        than a sample, its clock runs at another rate, readings stand still although the torque must change them.
+        than a sample, its clock runs at another rate, readings freeze although the torque must change them.
         Infinite: the rig is not watched.
     standstill_torque : float
-        Largest torque at which the axis may stand still, N·m: more than its greatest break-away torque. 0 stands for
+        Largest torque at which the axis may be at rest, N·m: more than its greatest break-away torque. 0 selects
         four fifths of ``torque``, as identification needs 1.25 times the break-away torque.
     """
 
@@ -281,7 +281,7 @@ class Rig(Protocol):
         ...
 
     def close(self) -> None:
-        """Take the torque away, disarm and disconnect. It may be called at any time: twice, after a failed `open`, and
+        """Remove the torque, disarm and disconnect. It may be called at any time: twice, after a failed `open`, and
         from another thread while `exchange` does not return."""
         ...
 

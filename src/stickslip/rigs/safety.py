@@ -9,11 +9,12 @@ setpoint and no controller can prolong it.
 What is expected of an answer, all within `stickslip.rigs.rig.Limits.answer_time` (t):
 
 - Its time increases in every sample, by no more than a sample and t, and not for t at a rate that is a quarter off.
-- The position changes within t where a torque stands that must move the axis. At rest an axis bears any torque up to
-  its break-away torque without a reading that changes, if the encoder is coarse; so that torque is a declared one,
+- The position changes within t if a torque acts that must move the axis. If the encoder is coarse, an axis at rest
+  shows no change of any reading up to its break-away torque; therefore that torque is declared,
   `stickslip.rigs.rig.Limits.standstill_torque`. Under a torque T beyond the break-away torque F_S the axis would move
-  by (T - F_S) t² / 2 J, which is far more than a count. An axis that was sliding, driven, and stands still from one
-  sample to the next has the torque that it slid under for this one: friction alone stops no inertia within a sample.
+  by (T - F_S) t² / 2 J, which is far more than a count. If a driven, sliding axis is at rest from one
+  sample to the next, the torque under which it slid replaces the declared one: friction alone stops no inertia within
+  a sample.
 - Not every reading stays as it is for t while the torque command changes by a tenth of its limit, if the measured
   torque has changed before.
 - The measured torque follows the command: averaged over t they differ by no more than half the command and a
@@ -258,7 +259,7 @@ def watch_torque(y: Any, b: Any, s: Any) -> None:
 
 
 def watch_answer(y: Any, b: Any, s: Any) -> None:
-    """What is expected of the rig's answer to the last command."""
+    """Check the rig's answer to the last command."""
     known = abs(y.position) < UNBOUNDED
     watched = b.answer < UNBOUNDED
     if s.started == 0.0:

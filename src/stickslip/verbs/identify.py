@@ -14,7 +14,7 @@ import numpy as np
 
 from stickslip import plugins
 from stickslip.arguments import arguments_checked
-from stickslip.control.own_loop import loop_text
+from stickslip.control.own_loop import ReferenceVelocity, loop_text
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
 from stickslip.identify.doctor import Diagnosis
@@ -39,7 +39,12 @@ from stickslip.verbs.examiner import Examiner
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, named, open_log
 
-Loops = str | Mapping[str, float | str] | Sequence[str | Mapping[str, float | str]] | None
+Loops = (
+    str
+    | Mapping[str, float | ReferenceVelocity]
+    | Sequence[str | Mapping[str, float | ReferenceVelocity]]
+    | None
+)
 
 
 @arguments_checked

@@ -47,7 +47,7 @@ def recommend(
     bandwidth: float | None = 10.0,
     damping: float | None = 1.0,
     linear: Literal["PD", "PID", "PR"] = "PD",
-    loop: str | Mapping[str, float | str] | None = None,
+    loop: str | Mapping[str, float | ReferenceVelocity] | None = None,
     controller: Controller | str | os.PathLike[str] | None = None,
     machine: Machine | str | os.PathLike[str] | None = None,
     sample_time: float | None = None,
@@ -314,7 +314,7 @@ def drive_with(
 def one_of(
     given: ReferenceVelocity | None, own: ReferenceVelocity | None, owner: str
 ) -> ReferenceVelocity | None:
-    """How the drive forms its reference velocity: as given, or as its loop says.
+    """Return how the drive forms its reference velocity: as given, or as its loop states.
 
     Raises
     ------
@@ -327,7 +327,7 @@ def one_of(
 
 
 def own_loop(
-    given: str | Mapping[str, float | str] | None, torque_limit: float
+    given: str | Mapping[str, float | ReferenceVelocity] | None, torque_limit: float
 ) -> tuple[Gains | Cascade | None, float, float, ReferenceVelocity | None]:
     """Return the gains of the drive's own loop, None without one; the corner of its filter, Hz; the limit, N·m; and how
     it forms its reference velocity, if that is stated.
@@ -348,7 +348,7 @@ def own_loop(
 
 
 def loop_of(
-    given: str | Mapping[str, float | str],
+    given: str | Mapping[str, float | ReferenceVelocity],
 ) -> tuple[Gains | Cascade, dict[str, float], ReferenceVelocity | None]:
     """Return the gains of a loop as the drive has it, its filter and limit, and how it forms its reference velocity.
 

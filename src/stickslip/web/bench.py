@@ -37,19 +37,22 @@ class Bench:
             process = await self._running()
             assert process.stdin is not None
             assert process.stdout is not None
+            wrong = "its process ended"
             try:
                 process.stdin.write(json.dumps({"case": case}).encode() + b"\n")
                 async with asyncio.timeout(PATIENCE):
                     await process.stdin.drain()
                     line = await process.stdout.readline()
-            except (TimeoutError, ConnectionError):
+            except (TimeoutError, ConnectionError) as error:
                 line = b""
+                if isinstance(error, TimeoutError):
+                    wrong = f"it timed out after {PATIENCE:.0f} s"
             except asyncio.CancelledError:
                 await self.close()  # its answer would be taken for the next one's
                 raise
             if not line:
                 await self.close()
-                raise Refused(422, "this simulation found no end or took its process along; change a number")
+                raise Refused(422, f"no result of this simulation: {wrong}; change a number")
         answer: dict[str, Any] = json.loads(line)
         if "error" in answer:
             raise Refused(422, answer["error"])

@@ -42,9 +42,9 @@ KNOWN: Mapping[str, type] = {
     "limits": dict, "asks": dict, "options": dict, "chosen": object, "columns": list, "findings": list, "facts": list,
     "sent": list, "logs": list,
 }  # fmt: skip
-"""What each value of an item's JSON is; one of another kind is left out."""
+"""Type of each value of an item's JSON; values of another type are left out."""
 EMPTY: Mapping[str, Mapping[str, Any]] = {"rigs": {"facts": [], "sent": []}, "studies": {"sent": []}}
-"""What the page expects of each kind; a model without `sent` was identified here."""
+"""Defaults that the page needs, by kind of item; a model without `sent` was identified here."""
 
 
 class NotThere(InputError):
@@ -124,7 +124,7 @@ class Item:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What is known of it, values of the wrong kind left out."""
+        """Facts about the item, without values of the wrong type."""
         found = read_whole(self.folder / "about.json")
         kept = {k: v for k, v in found.items() if k not in KNOWN or isinstance(v, KNOWN[k])}
         if not UPLOAD.fullmatch(kept.get("file", "upload.dat")):

@@ -32,7 +32,7 @@ KILLED = 9
 GRACE = 10.0
 """s beside the rig's own time for its ramp, after which a run that was asked to end is ended"""
 VIRTUAL: dict[str, Any] = {"sentence": "", "real": False, "limits": dict[str, float]()}
-"""What is known of a machine of the library"""
+"""Facts about a machine of the library."""
 MOST = 25
 """Rows of a frame, of each stretch one"""
 

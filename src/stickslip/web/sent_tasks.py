@@ -1,4 +1,4 @@
-"""What a worker does with models, studies and rigs from elsewhere; their code runs if this user has approved it."""
+"""Tasks of a worker on models, studies and rigs that were sent; their code runs if this user has approved it."""
 
 from __future__ import annotations
 

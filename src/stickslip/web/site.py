@@ -20,7 +20,7 @@ REMEDY = {
     "models": "delete it and start again", "settings": "delete it and start again",
     "rigs": "delete it and drop its files again",
 }  # fmt: skip
-"""What to do about an item of each kind whose job is gone."""
+"""Remedy for an item whose job is gone, by kind."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 NOTES = "notes_on_rows"
 """Key of a record's meta: what was left out of a table, in words."""
 MOST = 1000
-"""Rows of a table: each is a test at a constant velocity, which takes seconds. More are a log without times."""
+"""Most rows of a table: each is a test at constant velocity, which takes seconds. More rows are a log without times."""
 ALIKE = 0.1
 """Part of the torque by which that of both directions must differ for its sign to be certain."""
 
@@ -42,7 +42,7 @@ def examine_table(record: Record) -> tuple[Record, list[Finding]]:
     findings += units.assumed(View(record))
     if len(record) > MOST:
         message = f"{len(record)} rows without times are more than a table of steady points has: a log"
-        remedy = "say when they were taken, --map time=COLUMN:UNIT or --sample-time SECONDS"
+        remedy = "give their times with --map time=COLUMN:UNIT or --sample-time SECONDS"
         return record, [*findings, Finding("error", "no-clock", message, remedy=remedy)]
     torque = torque_in(record)
     velocity, effort = record["velocity"], record[torque]
@@ -83,7 +83,7 @@ def signs(velocity: Array, torque: Array) -> Iterator[Finding]:
             f"the torque is {forward:.4g} at positive velocities and {backward:.4g} at negative ones: friction would "
             "drive the axis"
         )
-        remedy = "if the torque has the other sign, say --map torque=COLUMN:-UNIT"
+        remedy = "if the torque is counted the other way, give --map torque=COLUMN:-UNIT"
         yield Finding("error", "torque-sign", message, remedy=remedy)
     elif abs(forward - backward) <= ALIKE * size and forward * backward > 0.0:
         message = (

@@ -22,7 +22,7 @@ Values = Callable[[Array], Array]
 REACH = 4.0
 """How far the nonlinear parameters are drawn from the vector's start, in coordinates."""
 LARGEST = 1e150
-"""Of a column of the linear part: the square of more overflows."""
+"""Largest number in a column of the linear part: the square of a larger one overflows."""
 ITERATIONS = 100
 """Of the linear part of a start: its active set changes once in each. (The reflective method of SciPy halves a step
 without end where rounding lets none succeed.) A start that takes more is as far as it then is; the search goes on."""

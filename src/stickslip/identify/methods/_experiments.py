@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from stickslip.control.linear import Cascade, Gains
-from stickslip.control.own_loop import kind_of_loop, split_loop
+from stickslip.control.own_loop import ReferenceVelocity, kind_of_loop, split_loop
 from stickslip.errors import InputError
 from stickslip.identify.experiment import DRIVES, Experiment, experiment_of
 from stickslip.identify.methods._records import MOTORS, with_extra
@@ -107,7 +107,7 @@ def experiment(record: Record, axis: ServoAxis, options: Options) -> Experiment:
     return experiment_of(record, axis, loop=loop_of(loop) if loop else None, name=name, output=output)
 
 
-def loop_of(given: str | Mapping[str, float | str]) -> Loop:
+def loop_of(given: str | Mapping[str, float | ReferenceVelocity]) -> Loop:
     """The sampled controller of ``kp=..,kd=..`` or ``kv=..,kvp=..``, or of a mapping with these names."""
     numbers, reference_velocity = split_loop(given)
     if reference_velocity == "instant":

@@ -203,7 +203,7 @@ def _undetermined(names: Sequence[str], w: Array, size: Array) -> str:
 
 
 def _level(tied: str) -> str:
-    """What else separates friction from a constant torque, if these are not distinguished."""
+    """Return what else separates friction from a constant torque, to end an error about both; else an empty text."""
     return ", or give --freeze offset=0 if no constant torque acts (a level axis)" if "offset" in tied else ""
 
 

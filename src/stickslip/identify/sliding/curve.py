@@ -245,9 +245,8 @@ def _open_notes(unknown: Sequence[str], untouched: Sequence[str]) -> list[str]:
     notes: list[str] = []
     if untouched:
         notes.append(
-            f"These data do not determine {listed(untouched)}: these act only away from constant velocity, and "
-            "stay at the "
-            "values that the search was given."
+            f"These data do not determine {listed(untouched)}: without effect at these velocities, they keep their "
+            "start values."
         )
     if unknown:
         notes.append(f"The data do not determine {listed(unknown)}: equally good curves differ in them.")
@@ -264,7 +263,8 @@ def _measure_next(points: SlidingPoints, found: Fit, settling: float | None) -> 
 def _misfit(points: SlidingPoints, found: Fit) -> dict[str, float]:
     weighted = found.optimum.residuals
     scores = criteria(found.optimum.cost, len(points), found.vector.size, found.noise)
-    return {
+    out = {
         "rms_Nm": found.rms, "worst_Nm": float(np.max(np.abs(weighted / points.weight))), "aicc": scores.aicc,
         "bic": scores.bic, "points": float(len(points)), "parameters": float(found.vector.size),
     }  # fmt: skip
+    return {name: x for name, x in out.items() if math.isfinite(x)}  # too few points have no criterion

@@ -1,4 +1,4 @@
-"""Torque at constant velocities as the parameters of a fit give it: a law and a constant torque."""
+"""Torque at constant velocities: a friction law plus a constant torque, for the parameters of a fit."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def tied_to_offset(points: SlidingPoints, template: Model, frozen: Iterable[str]
     """Return the free parameters of a law whose sum with a constant torque is all that the points determine.
 
     At speeds in one direction a constant torque acts as Coulomb friction does; so it does at speeds in both if a law
-    has parameters of its own for each.
+    has separate parameters for each direction.
     """
     moving = np.abs(points.velocity[points.velocity != 0.0])
     if moving.size == 0:

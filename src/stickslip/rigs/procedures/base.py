@@ -345,7 +345,7 @@ def _run(
     paced = rig.capabilities.real_clock or bool(realtime)
     account: Account | None = None
     step = next(steps, None)
-    # With nothing written, the loop is begun anew after a pause, and what was not kept is forgotten.
+    # If nothing is written, the loop is restarted after a pause, and rows that were not kept are dropped.
     single = path is not None or paced
     while step is not None:
         with Loop(rig, path=path, meta=meta, without_watchdog=without_watchdog, realtime=realtime) as loop:
@@ -358,8 +358,10 @@ def _run(
 
 
 def _next(steps: Steps, rows: Array) -> Step | None:
-    """The step after one that recorded these rows; None at the end: no exception, since that would leave the loop as
-    one that failed, which hides what the rig raises when it is closed."""
+    """Return the step after one that recorded these rows; None at the end.
+
+    An exception at the end would leave the loop as failed and hide the error that the rig raises when it is closed.
+    """
     try:
         return steps.send(rows)
     except StopIteration:
