@@ -79,6 +79,8 @@ LETTERED = re.compile(r"(?i)(?:axis|achse|axe|eje)[ _.-]?([a-hx-z])(?=[^a-z0-9]+
 """An axis's letter, and a quantity behind it: "Axis A Position", but not "axis.fActPos"."""
 AFTER_IN = re.compile(r"\s+in\s+(\S{1,12})\s*$|\s*[/,]\s*(\S{1,12})\s*$", re.IGNORECASE)
 CAMEL = re.compile(r"(?<=[a-zäöüß])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+IN_GROUP = re.compile(r"^/(?:\w+/)*|^.*[|]|^\w+(?:\.\w+)*\.(?=[^\W\d])")
+"""The groups before a signal's own name: "state.tau_J", "/motor_state/torque"."""
 PIECES = re.compile(r"[_\s]+")
 WORD_ENDS = re.compile(rf"{PIECES.pattern}|{CAMEL.pattern}")
 NUMBERED = re.compile(r"\d{1,2}")
@@ -136,7 +138,8 @@ def role_of(name: str, unit: str = "") -> Name:
     """Read a column's name; `unit` is the unit that the file gives besides."""
     bare, stated, parts, axis = _pieces(name, unit)
     family = " ".join(parts) + ("[]" if INDEX.search(name) else "")
-    if not _is_of_joint(parts, axis) or not (NO_SIGNAL.isdisjoint(parts) or _whole(bare)):
+    own = words(IN_GROUP.sub("", INDEX.sub("", name)))
+    if not _is_of_joint(parts, axis) or not (NO_SIGNAL.isdisjoint(own) or _whole(bare)):
         return Name("", 0, stated, axis, "", family)
     role, sure = _role(bare, parts)
     if role:
