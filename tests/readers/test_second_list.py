@@ -59,7 +59,8 @@ def test_a_separator_at_the_end_of_the_rows_shifts_nothing():
 
 
 def test_the_torque_of_a_robot_state_goes_before_its_command():
-    head = "time,state.q[0],state.q[1],state.dq[0],state.dq[1],state.tau_J[0],state.tau_J[1],cmd.tau_J_d[0],cmd.tau_J_d[1]"
+    signals = ("state.q", "state.dq", "state.tau_J", "cmd.tau_J_d")
+    head = ",".join(["time", *(f"{signal}[{i}]" for signal in signals for i in (0, 1))])
     name = write("franka.csv", head, T, 0 * T, Q, 0 * T, W, 0 * T, TORQUE, 1 + 0 * T, 2 + 0 * T)
     holds(read(name, ["position=state.q[1]"]), position=Q, velocity=W, motor_torque=TORQUE)
 
@@ -157,3 +158,29 @@ def test_a_table_of_steady_points_with_a_position_says_what_to_do(capsys):
 def test_a_column_of_deviations_is_no_torque():
     name = write("log.csv", "time_s,q_rad,tau_Nm,std_Nm", T, Q, TORQUE, 0.01 + 0 * T)
     holds(read(name), position=Q, motor_torque=TORQUE)
+
+
+def test_a_time_stamp_in_seconds_and_nanoseconds():
+    head = "header.stamp.sec,header.stamp.nanosec,position,velocity,effort"
+    name = write("topic.csv", head, 1_700_000_000 + T // 1, np.round(T % 1 * 1e9), Q, W, TORQUE)
+    holds(read(name), position=Q, velocity=W, motor_torque=TORQUE)
+
+
+def test_durations_of_a_timetable():
+    rows = [f"{t:.4g} sec,{q},{m}" for t, q, m in zip(T, Q, TORQUE)]
+    Path("log.csv").write_text("\n".join(["Time,theta_rad,torque_Nm", *rows]))
+    holds(read("log.csv"), position=Q, motor_torque=TORQUE)
+
+
+@pytest.mark.parametrize("form", ["{} {} {}", "/joint_states/{}_joint/{} [{}]", "{} {} ({})"])
+def test_the_joint_of_a_mapped_position_is_that_of_the_torque(form, capsys):
+    names = [
+        form.format(joint, quantity, unit)
+        for joint in ("elbow", "wrist")
+        for quantity, unit in (("position", "rad"), ("velocity", "rad/s"), ("torque", "Nm"))
+    ]
+    name = write("log.csv", ",".join(["time [s]", *names]), T, 0 * T + 1, 0 * T, 0 * T + 2, Q, W, TORQUE)
+    assert main(["doctor", name]) == 2
+    assert "say which, such as --map" in capsys.readouterr().out
+    record = read(name, [f"position={names[3]}"])
+    holds(record, position=Q, velocity=W, motor_torque=TORQUE)

@@ -90,7 +90,8 @@ PLAIN: dict[str, Unit] = {
     **dict.fromkeys(("degf", "fahrenheit", "f"), Unit("temperature", 5 / 9, -160 / 9)),
     # Shares of a rated value
     **dict.fromkeys(("%", "percent", "prozent", "pct", "perc", "%rated"), Unit("share", 1e-2)),
-    **dict.fromkeys(("‰", "permille", "permill", "promille", "0.1%", "1/1000", "%o", "permil", "perthousand"), Unit("share", 1e-3)),
+    **dict.fromkeys(("‰", "permille", "permill", "promille", "0.1%", "1/1000", "%o", "permil", "perthousand"),
+                    Unit("share", 1e-3)),
     **dict.fromkeys(("1", "pu", "p.u.", "share"), Unit("share")),
 }  # fmt: skip
 """Spellings without prefix, as `_normal` leaves them; lower case unless the case matters."""

@@ -43,6 +43,8 @@ SAMPLED, FEWEST = 2_000_000, 20
 """Characters of these lines, and the lines that are used however long they are."""
 USUAL = 0.8
 """Part of the lines of a sample in which a column of numbers holds one: header and footer are the rest"""
+IN_SECONDS = re.compile(r"^([-+.\deE]+) sec(?=[,;\t])")
+"""A duration in the first cell, as MATLAB writes timetables."""
 LABELLED = re.compile(
     r"([A-Za-z_][^:;,\t]*?)\s*[:=]\s*([-+]?\.?\d[\d.eE+-]*|nan|-?inf)(?:\s*[,;\t]\s*|\s+|$)"
 )
@@ -83,7 +85,7 @@ def read(path: Path) -> Table:
     """Every column of a text table."""
     lines = decoded(path).splitlines()
     _insist_on_short_lines(path, lines)
-    lines = clocks_whole(_without_labels(lines))
+    lines = clocks_whole(_without_labels([IN_SECONDS.sub(r"\1", line) for line in lines]))
     try:
         layout = _column_groups.find_layout(lines)
         return _plain(path, lines) if layout is None else _in_groups(path, lines, layout)
