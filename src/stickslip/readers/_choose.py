@@ -318,7 +318,7 @@ def _of_same_words(
     """Return the one of several alike columns that has the words of the motion or torque that is taken, and that one:
     "right_vel" for "right_pos", not "left_vel"."""
     own = [frozenset(words(c.name)) for c in candidates]
-    common = frozenset.intersection(*own)
+    common = own[0].intersection(*own[1:])
     for other in (chosen[role] for role in (*MAIN[1:], "current") if role in chosen):
         kin = [
             c

@@ -246,6 +246,9 @@ def _without_unit(name: str) -> tuple[str, str]:
     for match in reversed(list(IN_BRACKETS.finditer(name))):
         if may_be_unit(match[1]) and not match[1].isdigit():
             return (name[: match.start()] + " " + name[match.end() :]).strip(), match[1]
+    head, _, last = name.rstrip().rpartition(" ")
+    if head and "/" in last and may_be_unit(last):
+        return head.strip(), last
     tail = match[1] or match[2] if (match := AFTER_IN.search(name)) is not None else ""
     if match is not None and may_be_unit(tail) and not tail.isdigit():
         return name[: match.start()].strip(), tail
