@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from stickslip.errors import InputError, suggestion
 from stickslip.finding import Finding
 from stickslip.readers._joints import MAIN, Joints, listed_names, with_rates
-from stickslip.readers._names import ALIASES, KINDS, ROLES, Name, motor_force, role_of
+from stickslip.readers._names import ALIASES, KINDS, ROLES, Name, motor_force, role_of, words
 from stickslip.readers._units import in_its_case, may_be_unit, parse_unit, spellings
 from stickslip.readers.table_columns import Column, Table
 
@@ -113,7 +113,7 @@ def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list
             candidates = [c for c in table.columns if c.name in forces and c.name not in taken]
         candidates, found = joints.of_one_axis(role, candidates)
         findings += found
-        column, found = _pick(role, candidates, names)
+        column, found = _pick(role, candidates, names, chosen)
         findings += found
         if column is None:
             continue
@@ -255,7 +255,7 @@ def _guessed(role: str, column: Column, name: Name) -> Choice:
 
 
 def _pick(
-    role: str, candidates: Sequence[Column], names: Mapping[str, Name]
+    role: str, candidates: Sequence[Column], names: Mapping[str, Name], chosen: Mapping[str, Choice]
 ) -> tuple[Column | None, list[Finding]]:
     """The best candidate, and what is to be said of the choice."""
     if role == "load":
@@ -284,13 +284,22 @@ def _pick(
                 remedy=remedy,
             )
         ]
+    if kin := _of_same_words(
+        [c for c in ranked if _merit(names[c.name]) == _merit(names[first.name])], chosen
+    ):
+        other = kin[1]
+        message = (
+            f"{role} may be any of {listed}; {kin[0].name!r} was taken, whose name has the words of {other.role} "
+            f"{other.column!r}"
+        )
+        return kin[0], [Finding("note", "ambiguous-column", message, remedy=remedy)]
     if role not in MAIN:
         return None, [
             Finding(
                 "warning",
                 "ambiguous-column",
                 f"{role} may be any of {listed}; none was taken",
-                remedy=f"say --map {role}=COLUMN to use one",
+                remedy=f"say {_as_said(role, first.name)}, or another, to use one",
             )
         ]
     return first, [
@@ -298,9 +307,27 @@ def _pick(
             "error",
             "ambiguous-column",
             f"{role} may be any of {listed}",
-            remedy=f"say which with --map {role}=COLUMN",
+            remedy=f"say which, such as {_as_said(role, first.name)}",
         )
     ]
+
+
+def _of_same_words(
+    candidates: Sequence[Column], chosen: Mapping[str, Choice]
+) -> tuple[Column, Choice] | None:
+    """Return the one of several alike columns that has the words of the motion or torque that is taken, and that one:
+    "right_vel" for "right_pos", not "left_vel"."""
+    own = [frozenset(words(c.name)) for c in candidates]
+    common = own[0].intersection(*own[1:])
+    for other in (chosen[role] for role in (*MAIN[1:], "current") if role in chosen):
+        kin = [
+            c
+            for c, w in zip(candidates, own, strict=True)
+            if not (w - common).isdisjoint(words(other.column))
+        ]
+        if len(kin) == 1:
+            return kin[0], other
+    return None
 
 
 def _merit(name: Name) -> tuple[int, int, int]:

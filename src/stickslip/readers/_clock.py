@@ -11,6 +11,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.readers._choose import Choice
+from stickslip.readers._column_groups import epoch_unit
 from stickslip.readers._stated_period import stated_period
 from stickslip.readers._units import parse_unit
 from stickslip.readers.table_columns import Array, Column, Table
@@ -25,6 +26,7 @@ PERIODS = (
     "delta_t",
     "delta_x",
     "period",
+    "increment",
     "abtastzeit",
     "tsample",
     "sampling_period",
@@ -87,7 +89,7 @@ def time_of(
         choice = by_role["time"]
         time = _counted_on(columns[choice.column].values, choice, found)
         unit = parse_unit(choice.unit)
-        factor = unit.factor if unit is not None else _epoch(time)
+        factor = unit.factor if unit is not None else epoch_unit(time)
         if unit is None and factor != 1.0:
             found.append(
                 Finding(
@@ -135,6 +137,8 @@ def _as_steady(by_role: Mapping[str, Choice]) -> str:
     if may_be_steady(by_role):
         return "; a table of constant velocities and their torques is for --method sliding"
     parts = {"velocity": "velocity" in by_role, "torque": bool(by_role.keys() & EFFORTS)}
+    if "position" in by_role and all(parts.values()):
+        return "; if its rows are steady points (--method sliding), say --map position=none"
     if "position" in by_role or not any(parts.values()):
         return ""
     lacking = next(name for name, known in parts.items() if not known)
@@ -194,13 +198,6 @@ def _overruled(choice: Choice, time: Array, sample_time: float) -> list[Finding]
     return [
         Finding("warning", "time-overruled", said, remedy="leave --sample-time out if the column is right")
     ]
-
-
-def _epoch(time: Array) -> float:
-    """1, or what times since 1970 count: their size tells, since records are of 2001 to 2286."""
-    finite = time[np.isfinite(time)]
-    size = float(np.median(finite)) if finite.size else 0.0
-    return next((f for f, low in ((1e-9, 1e18), (1e-6, 1e15), (1e-3, 1e12)) if low <= size < 10.0 * low), 1.0)
 
 
 def _counted_on(time: Array, choice: Choice, found: list[Finding]) -> Array:

@@ -312,13 +312,21 @@ def timed_columns(
     for j in starts:
         unit = parse_unit(units[j] or role_of(names[j]).unit)
         known = unit is not None and unit.kind == "time"
-        times[j] = values[:, j] * (unit.factor if unit is not None and known else 1.0)
-        if not known and not findings:
+        factor = unit.factor if unit is not None and known else epoch_unit(values[:, j])
+        times[j] = values[:, j] * factor
+        if not known and factor == 1.0 and not findings:
             message = f"column {names[j]!r} states no unit: its times were taken in s"
             findings = [
                 Finding("warning", "time-unit", message, remedy="if wrong, give --sample-time SECONDS")
             ]
     return _columns(names, units, starts, values, times), findings
+
+
+def epoch_unit(time: Array) -> float:
+    """Return the unit in s of times since 1970, by their size, for dates of 2001 to 2286; 1 for other times."""
+    finite = time[np.isfinite(time)]
+    size = float(np.median(finite)) if finite.size else 0.0
+    return next((f for f, low in ((1e-9, 1e18), (1e-6, 1e15), (1e-3, 1e12)) if low <= size < 10.0 * low), 1.0)
 
 
 def _columns(

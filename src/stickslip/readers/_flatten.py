@@ -265,8 +265,12 @@ def _flat(
         if isinstance(value, Mapping) and depth < MAX_DEPTH:
             out |= _flat(cast("Mapping[str, Any]", value), name, depth + 1, within | {id(sample)})
         elif isinstance(value, (list, tuple)):
-            items = cast("Sequence[Any]", value)
-            out |= {f"{name}[{i}]": item for i, item in enumerate(items[:MAX_WIDTH])}
+            items = {f"{name}[{i}]": item for i, item in enumerate(cast("Sequence[Any]", value)[:MAX_WIDTH])}
+            for part, item in items.items():
+                if isinstance(item, Mapping) and depth < MAX_DEPTH:
+                    out |= _flat(cast("Mapping[str, Any]", item), part, depth + 1, within | {id(sample)})
+                else:
+                    out[part] = item
         else:
             out[name] = value
     return out

@@ -79,6 +79,8 @@ LETTERED = re.compile(r"(?i)(?:axis|achse|axe|eje)[ _.-]?([a-hx-z])(?=[^a-z0-9]+
 """An axis's letter, and a quantity behind it: "Axis A Position", but not "axis.fActPos"."""
 AFTER_IN = re.compile(r"\s+in\s+(\S{1,12})\s*$|\s*[/,]\s*(\S{1,12})\s*$", re.IGNORECASE)
 CAMEL = re.compile(r"(?<=[a-zäöüß])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+IN_GROUP = re.compile(r"^/(?:\w+/)*|^.*[|]|^\w+(?:\.\w+)*\.(?=[^\W\d])")
+"""The groups before a signal's own name: "state.tau_J", "/motor_state/torque"."""
 PIECES = re.compile(r"[_\s]+")
 WORD_ENDS = re.compile(rf"{PIECES.pattern}|{CAMEL.pattern}")
 NUMBERED = re.compile(r"\d{1,2}")
@@ -136,7 +138,8 @@ def role_of(name: str, unit: str = "") -> Name:
     """Read a column's name; `unit` is the unit that the file gives besides."""
     bare, stated, parts, axis = _pieces(name, unit)
     family = " ".join(parts) + ("[]" if INDEX.search(name) else "")
-    if not _is_of_joint(parts, axis) or not (NO_SIGNAL.isdisjoint(parts) or _whole(bare)):
+    own = words(IN_GROUP.sub("", INDEX.sub("", name)))
+    if not _is_of_joint(parts, axis) or not (NO_SIGNAL.isdisjoint(own) or _whole(bare)):
         return Name("", 0, stated, axis, "", family)
     role, sure = _role(bare, parts)
     if role:
@@ -243,6 +246,9 @@ def _without_unit(name: str) -> tuple[str, str]:
     for match in reversed(list(IN_BRACKETS.finditer(name))):
         if may_be_unit(match[1]) and not match[1].isdigit():
             return (name[: match.start()] + " " + name[match.end() :]).strip(), match[1]
+    head, _, last = name.rstrip().rpartition(" ")
+    if head and "/" in last and may_be_unit(last):
+        return head.strip(), last
     tail = match[1] or match[2] if (match := AFTER_IN.search(name)) is not None else ""
     if match is not None and may_be_unit(tail) and not tail.isdigit():
         return name[: match.start()].strip(), tail

@@ -1,4 +1,5 @@
-"""Columns of well-known tools whose names mean something else than their words: VESC Tool, UR's RTDE, LeRobot."""
+"""Columns of well-known tools whose names mean something else than their words: VESC Tool, UR's RTDE, LeRobot,
+ODrive, moteus, SINAMICS."""
 
 from __future__ import annotations
 
@@ -38,6 +39,8 @@ class Tool:
 
 JOINT = r"[_\[]?\d\]?"
 """Number of a joint at the end of a name."""
+GROUP, INDEXED = r"(?:.*[.:/])?", r"(?:\[\d+\])?"
+"""What may be before a signal's name and after it."""
 TOOLS = (
     Tool(
         "VESC Tool",
@@ -104,6 +107,47 @@ TOOLS = (
             ),
         ),
         "episode_index",
+    ),
+    Tool(
+        "ODrive",
+        (rf"{GROUP}(pos|vel)_estimate",),
+        (
+            (rf"{GROUP}(pos_estimate|pos_setpoint|input_pos)", "", "rev"),
+            (rf"{GROUP}(vel_estimate|vel_setpoint|input_vel)", "", "rev/s"),
+        ),
+        (
+            (
+                rf"{GROUP}(pos|vel)_estimate",
+                "positions are in revolutions and velocities in revolutions per second, as since firmware 0.5",
+                "if older firmware wrote the file, map them in counts and counts/s, with --counts-per-rev N",
+            ),
+        ),
+    ),
+    Tool(
+        "moteus",
+        (rf"{GROUP}servo_stats\.(position|velocity)",),
+        (
+            (rf"{GROUP}servo_stats\.position", "position", "rev"),
+            (rf"{GROUP}servo_stats\.velocity", "velocity", "rev/s"),
+            (rf"{GROUP}servo_stats\.torque_Nm", "motor_torque", "Nm"),
+            (rf"{GROUP}servo_stats\.q_A", "current", "A"),
+        ),
+    ),
+    Tool(
+        "SINAMICS",
+        (rf"{GROUP}r0*(6[1-3]|80){INDEXED}",),
+        (
+            (rf"{GROUP}r0*6[1-3]{INDEXED}", "", "rpm"),
+            (rf"{GROUP}r0*(79|80){INDEXED}", "", "Nm"),
+            (rf"{GROUP}r0*7[78]{INDEXED}", "", "A"),
+        ),
+        (
+            (
+                rf"{GROUP}r0*6[1-3]{INDEXED}",
+                "speeds are in rpm and torques in N·m, as of a rotary motor",
+                "map the columns of a linear motor with their units, m/min and N",
+            ),
+        ),
     ),
 )
 

@@ -38,6 +38,7 @@ PLAIN: dict[str, Unit] = {
     "arcsec": Unit("angle", TURN / 360 / 3600),
     "rev": Unit("angle", TURN), "revs": Unit("angle", TURN), "revolution": Unit("angle", TURN),
     "revolutions": Unit("angle", TURN), "turn": Unit("angle", TURN), "turns": Unit("angle", TURN),
+    **dict.fromkeys(("rot", "rots", "rotation", "rotations"), Unit("angle", TURN)),
     "umdr": Unit("angle", TURN), "umdrehung": Unit("angle", TURN), "umdrehungen": Unit("angle", TURN),
     "U": Unit("angle", TURN), "giri": Unit("angle", TURN), "giro": Unit("angle", TURN), "tr": Unit("angle", TURN),
     "tour": Unit("angle", TURN), "tours": Unit("angle", TURN),
@@ -89,7 +90,8 @@ PLAIN: dict[str, Unit] = {
     **dict.fromkeys(("degf", "fahrenheit", "f"), Unit("temperature", 5 / 9, -160 / 9)),
     # Shares of a rated value
     **dict.fromkeys(("%", "percent", "prozent", "pct", "perc", "%rated"), Unit("share", 1e-2)),
-    **dict.fromkeys(("‰", "permille", "permill", "promille", "0.1%", "1/1000", "%o", "permil"), Unit("share", 1e-3)),
+    **dict.fromkeys(("‰", "permille", "permill", "promille", "0.1%", "1/1000", "%o", "permil", "perthousand"),
+                    Unit("share", 1e-3)),
     **dict.fromkeys(("1", "pu", "p.u.", "share"), Unit("share")),
 }  # fmt: skip
 """Spellings without prefix, as `_normal` leaves them; lower case unless the case matters."""
@@ -199,7 +201,7 @@ def _plain(text: str) -> Unit | None:
 
 def _quotient(text: str) -> Unit | None:
     """A rate: something per second, minute or second squared."""
-    match = re.fullmatch(r"(.+?)(?:/(s2|s/s|sec2|s|sec|min|ms)|(s-2|s-1))", text)
+    match = re.fullmatch(r"(.+?)(?:/(s2|s/s|sec2|s|sec|min|ms|msec)|(s-2|s-1))", text)
     if match is None:
         return None
     below = match[2] or match[3]
@@ -208,5 +210,5 @@ def _quotient(text: str) -> Unit | None:
         return None
     if below in ("s2", "s/s", "sec2", "s-2"):
         return Unit(SECOND_RATES[above.kind], above.factor) if above.kind in SECOND_RATES else None
-    per = {"min": 60.0, "ms": 1e-3}.get(below, 1.0)
+    per = {"min": 60.0, "ms": 1e-3, "msec": 1e-3}.get(below, 1.0)
     return Unit(RATES[above.kind], above.factor / per)

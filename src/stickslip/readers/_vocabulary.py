@@ -57,7 +57,7 @@ WHOLE = _table(
         encoder.pos_estimate feedback_pulse_counter p_act r2521 phi_m theta_m theta_l q_l q_meas
     velocity: v w dq qd_m dqm dx qdot n 606c vl.fb s-0-0040 vx vel_estimate r0061 r61 r0063 r63 dq_act v_act
         n_act omega_m w_m v_m thetadot q_dot theta_dot
-    motor_torque: tq te t_m tm tau_m 6077 s-0-0084 r0080 r80 m_act m_motor u_tau tau_act
+    motor_torque: tq te t_m tm tau_m 6077 s-0-0084 r0080 r80 m_act m_motor u_tau tau_act qfrc_actuator
     friction_torque: tf t_f ff f_f tau_f m_r mr
     sensor_torque: sensor_torque torque_sensor
     current: i i_q iq_measured iq_act 6078 il.fb r0078 r78 i_act im i_m ia
@@ -116,7 +116,7 @@ SKIP = _words(
 )
 NO_SIGNAL = _words(
     """
-    counter enable enabled error_code flag gain id index limit mode state status valid
+    counter enable enabled error_code flag gain id index limit mode state status std stddev stdev valid
     """
 )
 CARTESIAN = _words("ee eef tcp effector endeffector wrench pose flange cartesian kartesisch xyz")

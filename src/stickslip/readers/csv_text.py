@@ -18,6 +18,7 @@ from stickslip.finding import Finding
 from stickslip.readers import _column_groups
 from stickslip.readers._cells import OF_DAY, cell, clocks_whole, decoded, moment, over_midnight
 from stickslip.readers._column_groups import Layout
+from stickslip.readers._names import role_of
 from stickslip.readers._signs import between_thousands
 from stickslip.readers._stated_period import is_period
 from stickslip.readers._units import may_be_unit
@@ -42,6 +43,13 @@ SAMPLED, FEWEST = 2_000_000, 20
 """Characters of these lines, and the lines that are used however long they are."""
 USUAL = 0.8
 """Part of the lines of a sample in which a column of numbers holds one: header and footer are the rest"""
+IN_SECONDS = re.compile(r"^([-+.\deE]+) sec(?=[,;\t])")
+"""A duration in the first cell, as MATLAB writes timetables."""
+LABELLED = re.compile(
+    r"([A-Za-z_][^:;,\t]*?)\s*[:=]\s*([-+]?\.?\d[\d.eE+-]*|nan|-?inf)(?:\s*[,;\t]\s*|\s+|$)"
+)
+LABELLED_ROW = re.compile(rf"\s*(?:{LABELLED.pattern})+")
+"""A cell "label:value", and a row of them."""
 COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s*")
 
 
@@ -77,7 +85,7 @@ def read(path: Path) -> Table:
     """Every column of a text table."""
     lines = decoded(path).splitlines()
     _insist_on_short_lines(path, lines)
-    lines = clocks_whole(lines)
+    lines = clocks_whole(_without_labels([IN_SECONDS.sub(r"\1", line) for line in lines]))
     try:
         layout = _column_groups.find_layout(lines)
         return _plain(path, lines) if layout is None else _in_groups(path, lines, layout)
@@ -149,22 +157,29 @@ def _plain(path: Path, lines: Sequence[str]) -> Table:
     insist_on_values(path, len(body) * dialect.width)
     values, odd = _values(body, dialect)
     findings += [*footer, *odd]
-    names, units = _names(header, dialect.width)
+    header, increments = _without_increments(header, dialect)
+    named, unnamed = _beside_numbers(header, values, dialect)
+    findings += unnamed
+    names, units = _names(named, dialect.width)
     clocks = _clocks(body, dialect)
-    if starts := _column_groups.time_columns(header, values):
+    constants = {**_constants(header, dialect), **increments}
+    if starts := _column_groups.time_columns(named, values):
         # The groups of slower channels end earlier.
         findings = [f for f in findings if f.code != "short-row" or dialect.delimiter == " "]
         units = ["s" if j in clocks else unit for j, unit in enumerate(units)]
         columns, assumed = _column_groups.timed_columns(names, units, starts, values)
         findings += assumed
-        return Table("csv", columns, _constants(header, dialect), tuple(findings))
+        return Table("csv", columns, constants, tuple(findings))
     if values.shape[1] and np.isnan(values[:, -1]).all() and not names[-1]:
         values = values[:, :-1]  # a delimiter ends every line
+    # A column of dates is the time whatever its name, unless another is called so.
+    only = clocks if len(clocks) == 1 and not any(role_of(name).role == "time" for name in names) else {}
     columns = tuple(
         Column(
             name or f"column {i + 1}",
             over_midnight(values[:, i], clocks.get(i)),
             "s" if i in clocks else unit,
+            channel="time" if i in only else "",
         )
         for i, (name, unit) in enumerate(zip(names[: values.shape[1]], units, strict=False))
         if i not in dialect.words
@@ -172,7 +187,7 @@ def _plain(path: Path, lines: Sequence[str]) -> Table:
     unread = _unread(names, body, dialect)
     if unread:
         findings.append(_left_out(unread))
-    return Table("csv", columns, _constants(header, dialect), tuple(findings), unread)
+    return Table("csv", columns, constants, tuple(findings), unread)
 
 
 def _left_out(unread: Mapping[str, str]) -> Finding:
@@ -186,6 +201,20 @@ def _unread(names: Sequence[str], body: Sequence[str], dialect: Dialect) -> dict
     return {
         names[i] or f"column {i + 1}": first[i].strip()[:30] for i in sorted(dialect.words) if i < len(first)
     }
+
+
+def _without_labels(lines: list[str]) -> list[str]:
+    """Return a table with one row of names if every cell has its label: "speed:1.2,current:0.3", as Arduinos print."""
+    cut = [LABELLED.findall(line) if LABELLED_ROW.fullmatch(line) else [] for line in lines]
+    labels = Counter(tuple(label for label, _ in cells) for cells in cut if cells)
+    usual, count = labels.most_common(1)[0] if labels else ((), 0)
+    if count < USUAL * sum(bool(line.strip()) for line in lines):
+        return lines
+    rows = [
+        ";".join(value for _, value in cells) if tuple(label for label, _ in cells) == usual else line
+        for cells, line in zip(cut, lines, strict=True)
+    ]
+    return [";".join(usual), *rows]
 
 
 # ---- lines to cells -----------------------------------------------------------------------------------------
@@ -449,6 +478,57 @@ def _names(header: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
         units = [_bare(c) for c in _fitted(rows.pop(), width)]
     names = _fitted(rows[-1], width) if rows else [""] * width
     return _distinct(names), units
+
+
+def _without_increments(
+    header: Sequence[Sequence[str]], dialect: Dialect
+) -> tuple[list[Sequence[str]], dict[str, float | str]]:
+    """Take the numbers out of the row below the names, as oscilloscopes write them: "X,CH1,Increment" above
+    "Sequence,Volt,2e-3"."""
+    rows = list(header)
+    if len(rows) < 2:
+        return rows, {}
+    names, below = (_fitted([text.strip() for text in row], dialect.width) for row in rows[-2:])
+    numbers = {name: cell(text, dialect.decimal) for name, text in zip(names, below, strict=True)}
+    found = {
+        name: number
+        for name, number in numbers.items()
+        if name and number is not None and not math.isnan(number)
+    }
+    if not found or not all(names) or any(cell(name, dialect.decimal) is not None for name in names):
+        return rows, {}
+    units = [text if may_be_unit(text) else "" for text in below]
+    words = [text if text and not unit and name not in found else name
+             for name, text, unit in zip(names, below, units, strict=True)]  # fmt: skip
+    return [*rows[:-2], words, units], {**found}
+
+
+def _beside_numbers(
+    header: Sequence[Sequence[str]], values: Array, dialect: Dialect
+) -> tuple[list[Sequence[str]], list[Finding]]:
+    """Return the header, its names moved by one if the first column has none since it numbers or labels the rows.
+
+    Raises
+    ------
+    InputError
+        If the names are one fewer than the columns, and it is not known which has none.
+    """
+    rows, width = list(header), dialect.width
+    short = [i for i, row in enumerate(rows) if len(row) == width - 1 and any(role_of(c).role for c in row)]
+    if not short or any(len(row) == width for row in rows) or np.isnan(values[:, -1]).all():
+        return rows, []
+    first = values[:, 0]
+    if not (0 in dialect.words or np.isnan(first).all() or np.all(np.diff(first) == 1.0)):
+        names = ", ".join(rows[short[-1]][:3])
+        raise InputError(
+            f"the row of names ({names}, ...) has {width - 1} cells, the rows below have {width}; add the name of "
+            "the column that has none"
+        )
+    message = (
+        "the first column has no name, since it numbers or labels the rows; the names are those of the others"
+    )
+    rows = [["", *row] if len(row) == width - 1 else row for row in rows]
+    return rows, [Finding("note", "row-numbers", message)]
 
 
 def _all_units(row: Sequence[str]) -> bool:

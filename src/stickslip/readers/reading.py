@@ -48,6 +48,8 @@ CHANNELS = ROLES
 PER_MILLE = re.compile(r"(?i)(?<![0-9a-f])60(?:77|b2)(?![0-9a-f])")
 """Objects of CiA 402 (IEC 61800-7-201) in thousandths of the rated torque: actual torque, torque offset."""
 
+PARTS = ("nanosec", "nanosecs", "nsec", "nsecs")
+"""Names of the nanoseconds in a time stamp of ROS."""
 COUNT_RATE = re.compile(r"(?i)(?<![0-9a-f])60(?:6b|6c|ff)(?![0-9a-f])")
 """Its velocities, in counts per second where nothing else is set."""
 
@@ -96,7 +98,30 @@ def open_table(path: str | os.PathLike[str]) -> Table:
     if not table.columns:
         raise InputError(f"{source} holds no columns of numbers; give a file with samples over time")
     insist_on_columns(source, len(table.columns))
-    return with_tool(table)
+    return with_tool(_with_whole_stamps(table))
+
+
+def _with_whole_stamps(table: Table) -> Table:
+    """Return the table with one column for every time stamp of ROS that has its seconds and nanoseconds in two."""
+    columns = {c.name: c for c in table.columns}
+    for name, seconds in list(columns.items()):
+        match = re.fullmatch(r"(.+?)[._]s(?:ec)?(s?)", name)
+        parts = [f"{match[1]}{sep}{word}" for sep in "._" for word in PARTS] if match else []
+        rest = next((columns[part] for part in parts if part in columns), None)
+        if (
+            match is None
+            or rest is None
+            or rest.clock is not seconds.clock
+            or rest.values.shape != seconds.values.shape
+        ):
+            continue
+        whole = replace(seconds, name=match[1], values=seconds.values + 1e-9 * rest.values, unit="s")
+        columns = {
+            (whole if c is seconds else c).name: whole if c is seconds else c
+            for c in columns.values()
+            if c is not rest
+        }
+    return replace(table, columns=tuple(columns.values()))
 
 
 def _head(source: Path) -> bytes:

@@ -14,7 +14,7 @@ from stickslip.identify.doctor.view import Array, View
 
 DEG, REV, RPM = math.pi / 180.0, 2.0 * math.pi, 2.0 * math.pi / 60.0
 POSITION = {"deg": DEG, "rev": REV, "mm": 1e-3, "um": 1e-6}
-STATED = re.compile(r"\[\s*([^\]]*[^\]\s\d][^\]]+?)\s*\]")
+STATED = re.compile(r"\[\s*([^\]]*[^\]\s\d][^\]]+?)\s*\]|(?i:\(\s*((?:user )?units?(?:/\w+)?)\s*\))")
 """What a column's name states as its unit: not an axis' number or letter."""
 AMBIGUOUS: dict[str, str] = dict.fromkeys(
     ("1/s", "s-1", "1/sec"), "revolutions a second in some drives' tools and radians in others"
@@ -45,8 +45,9 @@ def assumed(view: View) -> Iterator[Finding]:
     for channel in list(quiet):
         if match := STATED.search(view.name(channel)):
             quiet.remove(channel)
-            which = AMBIGUOUS.get(match[1].lower(), "which is none that is known")
-            message = f"{view.name(channel)!r} is in {match[1]!r}, {which}"
+            stated = match[1] or match[2]
+            which = AMBIGUOUS.get(stated.lower(), "which is none that is known")
+            message = f"{view.name(channel)!r} is in {stated!r}, {which}"
             remedy = f"say which it is, such as {view.mapped(channel, LIKELY[channel])}"
             yield Finding("error", "unknown-unit", message, remedy=remedy)
     if quiet:
