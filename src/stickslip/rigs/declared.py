@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Any
 
-from stickslip.errors import InputError, RigError
+from stickslip.errors import InputError, MeasurementFault, RigError
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, Rig
 
 FASTEST = 1e-7
@@ -51,13 +51,13 @@ def _told(kind: str, rig: Rig, what: str) -> Any:
 
 @contextmanager
 def blamed(rig: Rig, doing: str) -> Generator[None]:
-    """What a rig raises while it does something is told as its error; exits and what is meant for users as they are."""
+    """Report what a rig raises while it does something, exits included, as its error; errors for users as they are."""
     try:
         yield
     except (RigError, InputError):
         raise
-    except Exception as error:
-        raise RigError(f"{rig.name}: {doing} raised {type(error).__name__}: {error}") from error
+    except BaseException as error:
+        raise RigError(f"{rig.name}: {doing} raised {type(error).__name__}: {error}".rstrip(": ")) from error
 
 
 def last_resort(rig: Rig) -> str:
@@ -79,4 +79,9 @@ def answer(rig: Rig, doing: str, ask: Callable[[], Any]) -> Any:
         found = ask()
         if not isinstance(found, tuple) or len(found) != FIELDS:  # type: ignore[reportUnknownArgumentType]
             raise RigError(f"{rig.name}: {doing} gave {found!r}; it must give a Measurement")
-        return tuple(float(x) for x in found)  # type: ignore[reportUnknownVariableType,reportUnknownArgumentType]
+        numbers = tuple(float(x) for x in found)  # type: ignore[reportUnknownVariableType,reportUnknownArgumentType]
+        if not math.isfinite(numbers[0]):
+            raise MeasurementFault(
+                f"{rig.name}: {doing} gave the time {numbers[0]} s; correct the rig's clock"
+            )
+        return numbers
