@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from stickslip._stream_file import rows_since
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
 from stickslip.errors import InputError, LimitCrossed, MeasurementFault, RigError
@@ -339,3 +340,32 @@ def test_a_stream_whose_time_steps_back_names_the_row(tmp_path):
     t[190:] -= 0.05
     with pytest.raises(InputError, match=r"time goes from 0.189 to 0.14 s after row 190 of 300"):
         Record.load(stream(tmp_path / "a.stream", t))
+
+
+@pytest.mark.parametrize(("row", "value"), [(0, -math.inf), (299, math.inf), (150, math.nan)])
+def test_a_stream_with_a_time_that_is_no_number_is_refused(row, value, tmp_path):
+    t = 1e-3 * np.arange(300.0)
+    t[row] = value
+    with pytest.raises(InputError, match=f"{value}.* and must increase"):
+        Record.load(stream(tmp_path / "a.stream", t))
+
+
+@pytest.mark.parametrize("place", [8, 16, 24, 32])
+def test_sizes_in_a_damaged_stream_reserve_no_memory(place, tmp_path):
+    """Its header says how many rows and bytes follow: more than any memory."""
+    path = stream(tmp_path / "a.stream", 1e-3 * np.arange(300.0))
+    data = bytearray(path.read_bytes())
+    data[place : place + 8] = (1 << 50).to_bytes(8, "little")
+    path.write_bytes(data)
+    for read in (Record.load, lambda p: rows_since(p, 0)):
+        try:
+            read(path)
+        except InputError as error:
+            assert "a.stream is no" in str(error)  # noqa: PT017
+
+
+def test_a_sample_time_of_years_is_refused():
+    rig = CoulombRig()
+    rig.sample_time = 1e300
+    with pytest.raises(InputError, match=r"sample_time = 1e.300 s must be a number from 1e-07 to 100000"):
+        Loop(rig)

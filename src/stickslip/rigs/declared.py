@@ -10,8 +10,8 @@ from typing import Any
 from stickslip.errors import InputError, MeasurementFault, RigError
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, Rig
 
-FASTEST = 1e-7
-"""s, the shortest sample time"""
+FASTEST, SLOWEST = 1e-7, 1e5
+"""s, the shortest and the longest sample time"""
 FIELDS = len(Measurement._fields)
 
 
@@ -28,8 +28,10 @@ def checked(rig: Rig) -> Rig:
     limits, able = _told(kind, rig, "limits"), _told(kind, rig, "capabilities")
     if not isinstance(name, str):
         raise InputError(f"rig {kind}: name = {name!r} must be a text")
-    if not isinstance(sample_time, (int, float)) or not FASTEST <= sample_time < math.inf:
-        raise InputError(f"{name}: sample_time = {sample_time!r} s must be a number of at least {FASTEST:g}")
+    if not isinstance(sample_time, (int, float)) or not FASTEST <= sample_time <= SLOWEST:
+        raise InputError(
+            f"{name}: sample_time = {sample_time!r} s must be a number from {FASTEST:g} to {SLOWEST:g}"
+        )
     if not isinstance(limits, Limits):
         raise InputError(f"{name}: limits = {limits!r} must be a `stickslip.rigs.rig.Limits`")
     if not isinstance(able, Capabilities):
