@@ -69,6 +69,7 @@ FAULTS = {
     "sensor lost": (from_there(lambda y: y._replace(sensor=math.nan)), "the torque sensor has been NaN for 0.1 s"),
     "measured torque zero": (from_there(lambda y: y._replace(torque=0.0)), "does not follow the command"),
     "sensor inverted": (from_there(lambda y: y._replace(sensor=-y.sensor)), "against the torque with which"),
+    "sensor frozen": (frozen(("time", "position", "torque")), "the torque sensor reads .* check whether"),
     "a turn too far": (from_there(lambda y: y._replace(position=y.position + 2 * math.pi)), "speed = "),
 }  # fmt: skip
 

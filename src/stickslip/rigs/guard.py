@@ -244,7 +244,7 @@ def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] 
         case _ if reason == OPPOSED:
             return (
                 f"the torque sensor reads {value:.4g} N·m against the torque with which the motor drives the axis",
-                "invert the sensor's sign",
+                "check whether its reading is frozen; otherwise invert its sign",
             )
         case _:
             return None

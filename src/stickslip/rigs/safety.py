@@ -62,11 +62,11 @@ UNBOUNDED = 1e300  # stands for no bound
 RATE = 0.25  # of the sample time, by which the clock's steps may be off for long
 SLID, SLIDING = 10.0, 0.05  # samples in a row, and of the speed limit: the axis slides
 CHANGED = 0.1  # of the torque limit: a command that has changed, or is large enough to be compared
-UNLIKE, OFFSET = (
-    1.0 / 3.0,
-    0.05,
-)  # of the command, and of the torque limit: a measured torque that does not follow
-SENSED = 5.0  # of the answer time, for which a sensor may read against the motor: springs and inertia swing
+UNLIKE = 1.0 / 3.0  # of the command, and
+OFFSET = 0.05  # of the torque limit: a measured torque that does not follow
+SENSED = (
+    5.0  # of the answer time, that a changing sensor may read against the motor: springs and inertia swing
+)
 
 
 class Bounds(NamedTuple):
@@ -116,6 +116,7 @@ class Safety(NamedTuple):
     answered: Annotated[float, Par("N·m", "", "mean measured torque")]
     unlike: Annotated[float, Par("s", "", "for how long these have differed")]
     opposed: Annotated[float, Par("s", "", "for how long the sensor has read against the motor")]
+    steady: Annotated[float, Par("s", "", "for how long the sensor's torque has been the same")]
     sensing: Annotated[float, Par("-", "", "1 once the sensor's torque has changed")]
     lost: Annotated[float, Par("s", "", "for how long a torque that was measured has been NaN")]
     against: Annotated[float, Par("s", "", "for how long the axis has moved against the torque")]
@@ -273,12 +274,13 @@ def watch_torque(y: Any, b: Any, s: Any) -> None:
             s.unlike = 0.0
         if s.unlike > b.answer:
             stop(IGNORED, s.answered, s)
+    s.steady = s.steady + b.sample_time if y.sensor == s.sensor else 0.0
     if s.torque * s.velocity > 0.0 and abs(y.sensor) > CHANGED * b.torque:
         if y.sensor * s.torque > 0.0:
             s.opposed = 0.0
         else:
             s.opposed += b.sample_time
-            if s.opposed > SENSED * b.answer:
+            if s.opposed > SENSED * b.answer or min(s.opposed, s.steady) > b.answer:
                 stop(OPPOSED, y.sensor, s)
 
 
