@@ -190,26 +190,29 @@ def load(path: str | os.PathLike[str]) -> Contents:
             magic, start, count, length, trailer = HEAD.unpack(file.read(HEAD.size))
             if magic != MAGIC:
                 raise ValueError("no header")
-            header = json.loads(file.read(min(length, start)))
+            size = os.fstat(file.fileno()).st_size
+            header = json.loads(file.read(min(length, start, size)))
             units, absent, meta = (
                 dict(header["units"]),
                 header["absent"],
                 {**header["meta"], "complete": False},
             )
             file.seek(start)
-            data = file.read(min(count * len(units) * 8, os.fstat(file.fileno()).st_size))
+            data = file.read(min(count * len(units) * 8, size))
             if trailer and len(data) == count * len(units) * 8:
-                meta |= json.loads(file.read(trailer))
+                meta |= json.loads(file.read(min(trailer, size)))
     except FileNotFoundError:
         raise InputError(f"no record at {path}; check the path") from None
     except (OSError, ValueError, KeyError, TypeError, OverflowError, struct.error) as error:
-        raise InputError(f"{path} is not a record of this package ({error})") from None
+        raise InputError(f"{path} is not a record of this package ({error or 'damaged'})") from None
     values = np.frombuffer(data, dtype="<f8", count=len(data) // 8)
     rows = values[: len(values) // len(units) * len(units)].reshape(-1, len(units))
     lost = 0 if meta["complete"] else empty_end(rows)
     if lost:
         rows, meta = rows[:-lost], {**meta, "rows_lost": lost}
-    back = np.flatnonzero(~(np.diff(rows[:, 0]) > 0.0))
+    with np.errstate(invalid="ignore"):
+        steps = np.diff(rows[:, 0])
+    back = np.flatnonzero(~((steps > 0.0) & np.isfinite(steps)))
     if back.size:
         at = int(back[0])
         raise InputError(
@@ -249,10 +252,12 @@ def rows_since(path: Path, after: int) -> tuple[dict[str, str], Array]:
             magic, start, count, length, _ = HEAD.unpack(file.read(HEAD.size))
             if magic != MAGIC:
                 raise ValueError("no header")
-            units = {str(k): str(v) for k, v in json.loads(file.read(min(length, start)))["units"].items()}
+            size = os.fstat(file.fileno()).st_size
+            header = json.loads(file.read(min(length, start, size)))
+            units = {str(k): str(v) for k, v in header["units"].items()}
             file.seek(start + 8 * len(units) * after)
-            content = file.read(8 * len(units) * max(0, count - after))
-    except (OSError, ValueError, KeyError, struct.error) as error:
+            content = file.read(min(8 * len(units) * max(0, count - after), size))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError, struct.error) as error:
         raise InputError(f"{path} is no stream of a rig ({error})") from None
     whole = len(content) // (8 * len(units)) * len(units)
     return units, np.frombuffer(content, dtype="<f8", count=whole).reshape(-1, len(units))

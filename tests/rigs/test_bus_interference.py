@@ -12,6 +12,7 @@ from test_ds402 import NODE, drive  # noqa: E402, F401
 
 from stickslip.errors import DriveFault, InputError, RigError  # noqa: E402
 from stickslip.record import Record  # noqa: E402
+from stickslip.rigs import cia402  # noqa: E402
 from stickslip.rigs.ds402 import Ds402  # noqa: E402
 from stickslip.rigs.loop import Loop  # noqa: E402
 from stickslip.rigs.rig import Measurement, setpoints  # noqa: E402
@@ -51,7 +52,10 @@ INTERFERENCE = {
     "commands": ([(0x200 + NODE, bytes([0x0F, 0, 100, 0]), False)], "another master commands this drive"),
     "SYNC": ([(0x80, b"", False)], "another device sends SYNC"),
     "shorter TPDO": ([(0x180 + NODE, bytes(6), False)], "TPDO has 6 bytes"),
-    "mode": ([(0x600 + NODE, SET_MODE, False)], "mode of operation is 1 in place of 10"),
+    "mode": ([(0x600 + NODE, SET_MODE, False)], "another master writes object 6060h:0 "),
+    "watchdog": (
+        [(0x600 + NODE, bytes([0x2B, 0, 0x14, 5, 0, 0, 0, 0]), False)], "another master writes object 1400h:5 ",
+    ),
     "SDO abort": (
         [(0x580 + NODE, bytes([0x80, 0x61, 0x60, 0, 0, 0, 4, 8]), False)], "refuses upload of 6061h",
     ),
@@ -70,6 +74,35 @@ def test_interference_ends_the_run(drive, name, tmp_path):  # noqa: F811
     assert drive.changes(begin)[-1][1] == 0.0
     assert cause in Record.load(tmp_path / "run.stream").meta["ended"]
     drive.tell((0x6060, 0, "<b", 10))
+
+
+def test_a_mode_that_the_drive_leaves_by_itself(drive, monkeypatch):  # noqa: F811
+    """Nobody is seen to write it: an input or another interface of the drive."""
+    monkeypatch.setattr(cia402, "interference", lambda *_: "")
+    rig = Disturbed(drive.settings(), [(0x600 + NODE, SET_MODE, False)])
+    with pytest.raises(DriveFault, match="mode of operation is 1 in place of 10"), Loop(rig) as loop:
+        loop.run(setpoints(3000, torque=0.2))
+    assert rig.torques[-1] == 0.0
+    drive.tell((0x6060, 0, "<b", 10))
+
+
+@pytest.mark.parametrize(
+    ("bit", "cause"),
+    [(4, "voltage is off"), (9, "no longer remote"), (12, "no longer follows the target torque")],
+)
+def test_a_bit_of_the_statusword_that_is_lost(drive, bit, cause):  # noqa: F811
+    class Losing(Ds402):
+        calls = 0
+
+        def _cycle(self, word: int, torque: float) -> tuple[int, Measurement]:
+            self.calls += 1
+            status, measured = super()._cycle(word, torque)
+            return (status | 1 << bit if self.calls < 60 else status & ~(1 << bit)), measured
+
+    begin = time.monotonic_ns()
+    with pytest.raises(DriveFault, match=cause), Loop(Losing(drive.settings())) as loop:
+        loop.run(setpoints(3000, torque=0.2))
+    assert drive.changes(begin)[-1][1] == 0.0
 
 
 def test_frames_of_29_bits_are_not_the_drives(drive):  # noqa: F811

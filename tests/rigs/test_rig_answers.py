@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from stickslip._stream_file import rows_since
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
 from stickslip.errors import InputError, LimitCrossed, MeasurementFault, RigError
@@ -59,11 +60,16 @@ FAULTS = {
     "clock steps back": (clock(lambda t, k: t - 0.1 * (k >= AT)), "its time changes by -0.099 s"),
     "clock jumps ahead": (clock(lambda t, k: t + 3600.0 * (k >= AT)), "its time changes by 3600 s"),
     "clock is not a number": (clock(lambda t, k: math.nan if k >= AT else t), "its time changes by nan s"),
+    "clock is infinite": (clock(lambda t, k: math.inf if k >= AT else t), "its time changes by inf s .* at t = 0.2"),
+    "clock is huge": (clock(lambda t, k: 1e300 if k >= AT else t), "its time changes by 1e.300 s .* at t = 0.2"),
     "clock twice as fast": (clock(lambda t, k: 2.0 * t), "its time changes by 0.002 s"),
     "clock half as fast": (clock(lambda t, k: 0.5 * t), "its time changes by 0.0005 s"),
     "measured torque inverted": (from_there(lambda y: y._replace(torque=-y.torque)), "does not follow the command"),
+    "measured torque lost": (from_there(lambda y: y._replace(torque=math.nan)), "motor torque has been NaN for 0.1 s"),
+    "sensor lost": (from_there(lambda y: y._replace(sensor=math.nan)), "the torque sensor has been NaN for 0.1 s"),
     "measured torque zero": (from_there(lambda y: y._replace(torque=0.0)), "does not follow the command"),
     "sensor inverted": (from_there(lambda y: y._replace(sensor=-y.sensor)), "against the torque with which"),
+    "sensor frozen": (frozen(("time", "position", "torque")), "the torque sensor reads .* check whether"),
     "a turn too far": (from_there(lambda y: y._replace(position=y.position + 2 * math.pi)), "speed = "),
 }  # fmt: skip
 
@@ -86,6 +92,88 @@ def test_a_fault_while_it_follows_a_sine(name, tmp_path):
     rig = CoulombRig(change)
     ended(rig, cause, tmp_path / "run.stream", lambda loop: loop.run(sine(5000), PD))
     assert len(rig.torques) < AT + 2000
+
+
+def test_a_limit_that_is_crossed_names_its_possible_cause(tmp_path):
+    """Three times the torque, and an encoder that counts backwards, drive the axis to its speed limit at once."""
+    rig = CoulombRig(acts=lambda torque: 3.0 * torque)
+    ended(
+        rig, "speed = .*the measured torque did not follow", tmp_path / "a.stream",
+        lambda loop: loop.run(setpoints(5000, torque=0.25)),
+    )  # fmt: skip
+    backwards = CoulombRig(lambda y, _: y._replace(position=-y.position))
+    ended(
+        backwards,
+        "speed = .*accelerated against the torque",
+        tmp_path / "b.stream",
+        lambda loop: loop.run(sine(5000), PD),
+    )
+    fast = CoulombRig(friction=0.05)
+    ended(fast, "speed = [^;]*; the torque was ramped to zero$", tmp_path / "c.stream",
+          lambda loop: loop.run(setpoints(5000, torque=0.9)))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "error", [SystemExit(3), KeyboardInterrupt(), MemoryError(), GeneratorExit(), OSError("cable")]
+)
+@pytest.mark.parametrize("call", ["open", "exchange", "close"])
+def test_whatever_a_call_of_the_rig_raises_is_its_error(call, error, tmp_path):
+    """Also what would end the process without a word."""
+
+    class Raising(CoulombRig):
+        def fail(self, name: str, failing: bool = True) -> None:
+            if name == call and failing:
+                raise error
+
+        def open(self) -> Measurement:
+            self.fail("open")
+            return super().open()
+
+        def exchange(self, torque: float) -> Measurement:
+            measured = super().exchange(torque)
+            self.fail("exchange", len(self.torques) == AT)
+            return measured
+
+        def close(self) -> None:
+            super().close()
+            self.fail("close")
+
+    rig = Raising()
+    cause = f"coulomb: {call} raised {type(error).__name__}"
+    with pytest.raises(RigError, match=cause), Loop(rig, path=tmp_path / "a.stream") as loop:
+        loop.run(setpoints(2 * AT, torque=0.25))
+    assert rig.closed
+    assert not rig.torques or rig.torques[-1] == 0.0
+    if call != "open":
+        assert cause in Record.load(tmp_path / "a.stream").meta["ended"]
+
+
+def test_a_rig_that_does_not_close_is_reported_after_a_limit():
+    class Stuck(CoulombRig):
+        def close(self) -> None:
+            raise OSError("cable")
+
+    with (
+        pytest.raises(LimitCrossed, match=r"speed = .*; coulomb: close raised OSError: cable"),
+        Loop(Stuck()) as loop,
+    ):
+        loop.run(setpoints(5000, torque=0.9))
+
+
+def test_a_time_that_is_no_number_at_the_start():
+    class Timeless(CoulombRig):
+        def open(self) -> Measurement:
+            return super().open()._replace(time=math.inf)
+
+    with pytest.raises(MeasurementFault, match="open gave the time inf s"), Loop(Timeless()):
+        pass
+
+
+def test_torques_that_are_read_now_and_then_are_no_fault():
+    """A slow sensor reads NaN between its readings."""
+    rig = CoulombRig(lambda y, k: y if k % 50 == 0 else y._replace(torque=math.nan, sensor=math.nan))
+    with Loop(rig) as loop:
+        assert len(loop.run(sine(2000), PD)) == 2000
 
 
 @pytest.mark.parametrize("name", ["everything repeated", "all but the time", "the position", "clock stands"])
@@ -253,3 +341,32 @@ def test_a_stream_whose_time_steps_back_names_the_row(tmp_path):
     t[190:] -= 0.05
     with pytest.raises(InputError, match=r"time goes from 0.189 to 0.14 s after row 190 of 300"):
         Record.load(stream(tmp_path / "a.stream", t))
+
+
+@pytest.mark.parametrize(("row", "value"), [(0, -math.inf), (299, math.inf), (150, math.nan)])
+def test_a_stream_with_a_time_that_is_no_number_is_refused(row, value, tmp_path):
+    t = 1e-3 * np.arange(300.0)
+    t[row] = value
+    with pytest.raises(InputError, match=f"{value}.* and must increase"):
+        Record.load(stream(tmp_path / "a.stream", t))
+
+
+@pytest.mark.parametrize("place", [8, 16, 24, 32])
+def test_sizes_in_a_damaged_stream_reserve_no_memory(place, tmp_path):
+    """Its header says how many rows and bytes follow: more than any memory."""
+    path = stream(tmp_path / "a.stream", 1e-3 * np.arange(300.0))
+    data = bytearray(path.read_bytes())
+    data[place : place + 8] = (1 << 50).to_bytes(8, "little")
+    path.write_bytes(data)
+    for read in (Record.load, lambda p: rows_since(p, 0)):
+        try:
+            read(path)
+        except InputError as error:
+            assert "a.stream is no" in str(error)  # noqa: PT017
+
+
+def test_a_sample_time_of_years_is_refused():
+    rig = CoulombRig()
+    rig.sample_time = 1e300
+    with pytest.raises(InputError, match=r"sample_time = 1e.300 s must be a number from 1e-07 to 100000"):
+        Loop(rig)

@@ -27,6 +27,7 @@ LIMITS = Limits(
     torque=1.0, speed=50.0, position=(-2.0, 2.0), temperature=80.0, following_error=0.5, stop_time=0.02
 )
 GOOD = Measurement(0.0, 0.1, 0.2, 0.2, 25.0, 0.0)
+UNMEASURED = GOOD._replace(torque=math.nan)
 HOLD = Setpoint(position=0.1, closed=1.0)
 PD = Controller(pd(19.8, 0.17), torque_limit=1.0, sample_time=T)
 
@@ -141,10 +142,10 @@ def takes_over(controller, last: float, own: float, before: Setpoint) -> tuple[l
     """Torques of a controller that closes the loop at a step of 0.02 rad, and those it gives where none was before."""
     taking, alone = control_of(controller, LIMITS, T), control_of(controller, LIMITS, T)
     alone.memory[NAMES.index("open")] = 0.0
-    run(taking, GOOD, before._replace(torque=last))
+    run(taking, UNMEASURED, before._replace(torque=last))
     closed = HOLD._replace(position=0.12, torque=own)
-    return [run(taking, GOOD, closed)[0] for _ in range(150)], [
-        run(alone, GOOD, closed)[0] for _ in range(150)
+    return [run(taking, UNMEASURED, closed)[0] for _ in range(150)], [
+        run(alone, UNMEASURED, closed)[0] for _ in range(150)
     ]
 
 

@@ -37,7 +37,11 @@ NEXT = {
 HOMED, HOMING_ERROR = 1 << 12, 1 << 13  # of the statusword in homing mode
 UNKNOWN_FAULT = 0xFFFF
 """Where a drive shows a fault and has not said which"""
-KEPT = {1 << 4: "that its voltage is off", 1 << 9: "that it is no longer remote: it ignores the controlword"}
+KEPT = {
+    1 << 4: "that its voltage is off",
+    1 << 9: "that it is no longer remote: it ignores the controlword",
+    1 << 12: "that it no longer follows the target torque",
+}
 """Bits of the statusword that a drive may lack, but must not lose"""
 
 # ---- what is heard on the bus -----------------------------------------------------------------------------------
@@ -46,6 +50,8 @@ MODE_QUESTION = bytes([0x40, MODE_SHOWN & 0xFF, MODE_SHOWN >> 8, 0, 0, 0, 0, 0])
 ABORT = 0x80  # of SDO
 BUS_OFF = 0x40  # of an error frame, as SocketCAN numbers them
 OPERATIONAL = 5
+DOWNLOADS = (1, 6)
+"""SDO commands that begin to write an object, in one piece or in blocks"""
 NMT = {0x02: "stop", 0x80: "enter pre-operational", 0x81: "reset node", 0x82: "reset communication"}
 """Commands after which a node exchanges no PDO"""
 
@@ -56,6 +62,9 @@ def interference(service: int, data: bytes, node: int) -> str:
         return "another device sends SYNC on this bus: two masters cannot share it"
     if service == 0x200 + node:
         return f"another master commands this drive (RPDO {service:03X}h)"
+    if service == 0x600 + node and len(data) == 8 and data[0] >> 5 in DOWNLOADS:
+        index = int.from_bytes(data[1:3], "little")
+        return f"another master writes object {index:04X}h:{data[3]} of this drive (SDO)"
     if service == 0 and len(data) == 2 and data[1] in (0, node) and data[0] in NMT:
         return f"another master has sent the NMT command {NMT[data[0]]!r}"
     if service == 0x700 + node and len(data) == 1:

@@ -7,11 +7,11 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Any
 
-from stickslip.errors import InputError, RigError
+from stickslip.errors import InputError, MeasurementFault, RigError
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, Rig
 
-FASTEST = 1e-7
-"""s, the shortest sample time"""
+FASTEST, SLOWEST = 1e-7, 1e5
+"""s, the shortest and the longest sample time"""
 FIELDS = len(Measurement._fields)
 
 
@@ -28,8 +28,10 @@ def checked(rig: Rig) -> Rig:
     limits, able = _told(kind, rig, "limits"), _told(kind, rig, "capabilities")
     if not isinstance(name, str):
         raise InputError(f"rig {kind}: name = {name!r} must be a text")
-    if not isinstance(sample_time, (int, float)) or not FASTEST <= sample_time < math.inf:
-        raise InputError(f"{name}: sample_time = {sample_time!r} s must be a number of at least {FASTEST:g}")
+    if not isinstance(sample_time, (int, float)) or not FASTEST <= sample_time <= SLOWEST:
+        raise InputError(
+            f"{name}: sample_time = {sample_time!r} s must be a number from {FASTEST:g} to {SLOWEST:g}"
+        )
     if not isinstance(limits, Limits):
         raise InputError(f"{name}: limits = {limits!r} must be a `stickslip.rigs.rig.Limits`")
     if not isinstance(able, Capabilities):
@@ -51,13 +53,13 @@ def _told(kind: str, rig: Rig, what: str) -> Any:
 
 @contextmanager
 def blamed(rig: Rig, doing: str) -> Generator[None]:
-    """What a rig raises while it does something is told as its error; exits and what is meant for users as they are."""
+    """Report what a rig raises while it does something, exits included, as its error; errors for users as they are."""
     try:
         yield
     except (RigError, InputError):
         raise
-    except Exception as error:
-        raise RigError(f"{rig.name}: {doing} raised {type(error).__name__}: {error}") from error
+    except BaseException as error:
+        raise RigError(f"{rig.name}: {doing} raised {type(error).__name__}: {error}".rstrip(": ")) from error
 
 
 def last_resort(rig: Rig) -> str:
@@ -79,4 +81,9 @@ def answer(rig: Rig, doing: str, ask: Callable[[], Any]) -> Any:
         found = ask()
         if not isinstance(found, tuple) or len(found) != FIELDS:  # type: ignore[reportUnknownArgumentType]
             raise RigError(f"{rig.name}: {doing} gave {found!r}; it must give a Measurement")
-        return tuple(float(x) for x in found)  # type: ignore[reportUnknownVariableType,reportUnknownArgumentType]
+        numbers = tuple(float(x) for x in found)  # type: ignore[reportUnknownVariableType,reportUnknownArgumentType]
+        if not math.isfinite(numbers[0]):
+            raise MeasurementFault(
+                f"{rig.name}: {doing} gave the time {numbers[0]} s; correct the rig's clock"
+            )
+        return numbers

@@ -17,10 +17,12 @@ from stickslip.errors import (
 from stickslip.rigs.loop_sample import BOUNDS, MEASURED, REMEMBERED, SAFETY, Control
 from stickslip.rigs.rig import LIMIT_UNITS, Limits
 from stickslip.rigs.safety import (
+    AGAINST,
     ASKED,
     CLOCK,
     FROZEN,
     IGNORED,
+    LOST,
     NONE,
     OPPOSED,
     REASONS,
@@ -36,6 +38,8 @@ from stickslip.stream import Stream
 
 STATE = Safety._fields.index("state")
 """Every sample asks for it, and a place takes a quarter of the time that a name does."""
+EXCHANGE, CONTROLLER = "exchange", "the controller"
+"""Calls that may raise"""
 KNOWN = ("started", "turns", "position", "velocity", "slow_velocity", "error")
 """What one controller takes over from another: position and velocities, but nothing of its laws"""
 
@@ -56,6 +60,7 @@ class Guard:
 
     def __init__(self, control: Control) -> None:
         self.fault: BaseException | None = None
+        self._source = ""
         self._late = False
         self._name(control)
 
@@ -102,12 +107,12 @@ class Guard:
 
     # ---- stopping ------------------------------------------------------------------------------------------
 
-    def ask(self, reason: BaseException) -> None:
-        """Begin to stop, unless that is under way; the first reason is the one that is told."""
+    def ask(self, reason: BaseException, source: str = "") -> None:
+        """Begin to stop, unless that is under way; the first reason is reported, with the call that raised it."""
         s = self._safety
         if s["state"] == STOPPED or s["reason"] != NONE:
             return
-        self.fault = reason
+        self.fault, self._source = reason, source
         s["state"], s["reason"] = STOPPING, ASKED
 
     def cut(self) -> None:
@@ -132,9 +137,13 @@ class Guard:
         return True
 
     def at_last(self, fault: BaseException | None) -> None:
-        """What went wrong after the last sample; told by leaving the loop, unless something else is."""
-        if fault is not None and self.fault is None:
+        """Note what went wrong after the last sample: leaving the loop reports it, after an earlier error."""
+        if fault is None or fault is self.fault:
+            return
+        if self.fault is None:
             self.fault, self._late = fault, True
+        elif isinstance(self.fault, RigError) and isinstance(fault, RigError):
+            self.fault.args = (f"{self.fault}; {fault}",)
 
     def leave_untold(self) -> None:
         """The fault is raised when the loop is left, unless its block raises."""
@@ -155,12 +164,11 @@ class Guard:
 
     def error(self, rig: str, limits: Limits, stream: Stream) -> BaseException:
         """What is raised once the torque is zero."""
-        s, at = self._safety, float(self._measured["time"])
-        if not math.isfinite(at):
-            at = float(s["time"])
+        s = self._safety
+        at = float(s["time"])
         if self.fault is None:
-            self.fault = crossed(rig, limits, int(s["reason"]), float(s["value"]), at)
-        fault = self.fault = told(self.fault)
+            self.fault = crossed(rig, limits, int(s["reason"]), float(s["value"]), int(s["suspect"]), at)
+        fault = self.fault = told(rig, self.fault, self._source)
         if isinstance(fault, RigError):
             if math.isnan(fault.time):
                 fault.time = at
@@ -170,8 +178,8 @@ class Guard:
         return fault
 
 
-def crossed(rig: str, limits: Limits, reason: int, value: float, at: float) -> RigError:
-    """The error for what the guarded sample itself saw: the limit, the `value` that crossed it, and when."""
+def crossed(rig: str, limits: Limits, reason: int, value: float, suspect: int, at: float) -> RigError:
+    """The error for what the guarded sample itself saw: the limit, the `value` that crossed it, why, and when."""
     where = f"at t = {at:.3f} s; the torque was ramped to zero"
     name = REASONS[reason]
     if reason == CLOCK:
@@ -180,10 +188,12 @@ def crossed(rig: str, limits: Limits, reason: int, value: float, at: float) -> R
         what, remedy = found
         return MeasurementFault(f"{rig}: {what} {where}; {remedy}")
     if reason == STATUS:
-        code = int(value) if math.isfinite(value) else 0
-        return DriveFault(f"{rig} reports fault 0x{code:04X} {where}")
+        shown = f"0x{int(value):04X}" if math.isfinite(value) else f"{value:g}, which is not a number,"
+        return DriveFault(f"{rig} reports fault {shown} {where}")
     if limit := limits.text(name):
-        return LimitCrossed(f"{name} = {value:g} {LIMIT_UNITS[name]} is beyond its limit {limit} {where}")
+        return LimitCrossed(
+            f"{name} = {value:g} {LIMIT_UNITS[name]} is beyond its limit {limit} {where}{SUSPECTED.get(suspect, '')}"
+        )
     if math.isfinite(value):
         return LimitCrossed(f"an input of the controller, or the torque it computed, is {name} {where}")
     return LimitCrossed(f"position or torque is {value:g}, {name}, {where}")
@@ -195,6 +205,14 @@ def clock_fault(rig: str, step: float, where: str) -> MeasurementFault:
         f"{rig}: its time changes by {step:.6g} s {where}; it must increase by the sample time in every sample; "
         "correct the rig's clock"
     )
+
+
+WIRING = "check the current loop, the sign and the torque constant; a rig that measures no torque returns NaN"
+SUSPECTED = {
+    IGNORED: f"; before, the measured torque did not follow the command: {WIRING}",
+    AGAINST: "; before, the axis accelerated against the torque: check signs and delays of position and torque",
+}
+"""What a limit that was crossed may be due to"""
 
 
 def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] | None:
@@ -212,20 +230,28 @@ def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] 
         ),
         IGNORED: (
             f"the measured torque, {value:.4g} N·m on average, does not follow the command {waited}",
-            "check the current loop, the sign and the torque constant; a rig that measures no torque returns NaN",
+            WIRING,
+        ),
+        LOST: (
+            f"the {'torque sensor' if value else 'motor torque'} has been NaN {waited} after it was measured",
+            "check the sensor and its connection",
         ),
         OPPOSED: (
             f"the torque sensor reads {value:.4g} N·m against the torque with which the motor drives the axis",
-            "invert the sensor's sign",
+            "check whether its reading is frozen; otherwise invert its sign",
         ),
     }
     return found.get(reason)
 
 
-def told(fault: BaseException) -> BaseException:
-    """What is raised for an exception that stopped a run: errors of rigs and users, and exits, as they are."""
-    if isinstance(fault, (RigError, InputError)) or not isinstance(fault, Exception):
+def told(rig: str, fault: BaseException, source: str) -> BaseException:
+    """What is raised for an exception that stopped a run: errors of rigs and users as they are, and the user's exits.
+
+    A rig that exits (`SystemExit`, `KeyboardInterrupt`) has failed; signals are heard by the loop itself.
+    """
+    if isinstance(fault, (RigError, InputError)) or not (isinstance(fault, Exception) or source == EXCHANGE):
         return fault
-    error = RigError(f"{type(fault).__name__} in the loop: {fault}; the torque was ramped to zero")
+    raised = f"{source or 'the loop'} raised {type(fault).__name__}: {fault}".rstrip(": ")
+    error = RigError(f"{rig}: {raised}; the torque was ramped to zero")
     error.__cause__ = fault
     return error

@@ -27,7 +27,7 @@ from stickslip.errors import InputError, MessageLost, Overrun, RigError
 from stickslip.record import Record
 from stickslip.rigs.budget import BUDGET, Budget, Watch
 from stickslip.rigs.declared import FIELDS, answer, blamed, checked, last_resort
-from stickslip.rigs.guard import Guard, clock_fault
+from stickslip.rigs.guard import CONTROLLER, EXCHANGE, Guard, clock_fault
 from stickslip.rigs.interrupts import Signals
 from stickslip.rigs.loop_sample import COLUMNS, UNITS, Control, control_of
 from stickslip.rigs.realtime import TIMES, Account, Pace, soft_real_time
@@ -418,7 +418,7 @@ class Loop:
             self._answered = True
         except BaseException as error:  # whatever it is: the torque goes to zero first
             self._guard.pass_time(self.rig.sample_time)
-            self._guard.ask(error)
+            self._guard.ask(error, EXCHANGE)
 
     def _row(self, stream: Stream | None) -> int:
         """Address of where the sample is recorded; without room for it, nowhere, and the loop stops."""
@@ -437,7 +437,7 @@ class Loop:
         try:
             self._setpoint[TORQUE] += python(Measurement(*self._guard.control.measured), Setpoint(*setpoint))
         except BaseException as error:
-            self._guard.ask(error)
+            self._guard.ask(error, CONTROLLER)
 
     def _in_blocks(self, stream: Stream, setpoints: Array) -> None:
         """In compiled blocks through `BlockRig.exchange_block`."""
@@ -450,7 +450,7 @@ class Loop:
                 rows = stream.room(min(BLOCK, len(setpoints) - done))
                 count = rig.exchange_block(self._guard.control, setpoints[done : done + len(rows)], rows)
             except BaseException as error:
-                self._guard.ask(error)
+                self._guard.ask(error, EXCHANGE)
                 return
             stream.commit(count)
             done += count

@@ -16,7 +16,7 @@ from stickslip.config import Table
 from stickslip.errors import InputError, RigError
 from stickslip.readers import read
 from stickslip.record import Record
-from stickslip.rigs.declared import FASTEST
+from stickslip.rigs.declared import FASTEST, SLOWEST
 from stickslip.rigs.files import limits_in
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog
 
@@ -169,9 +169,10 @@ def usable(sample_time: float) -> float:
     ------
     InputError
     """
-    if not FASTEST <= sample_time < math.inf:
+    if not FASTEST <= sample_time <= SLOWEST:
         raise InputError(
-            f"replay: sample_time = {sample_time:g} s must be at least {FASTEST:g}; give one, or fix the log's times"
+            f"replay: sample_time = {sample_time:g} s must be from {FASTEST:g} to {SLOWEST:g}; "
+            "give one, or fix the log's times"
         )
     return sample_time
 

@@ -17,8 +17,12 @@ What is expected of an answer, all within `stickslip.rigs.rig.Limits.answer_time
   a sample.
 - Not every reading stays as it is for t while the torque command changes by a tenth of its limit, if the measured
   torque has changed before.
-- The measured torque follows the command: averaged over t they differ by no more than half the command and a
-  twentieth of the limit. The sensor's has its direction while the motor drives the axis.
+- The measured torque follows the command: averaged over t they differ by no more than a third of the command and a
+  twentieth of the limit. The sensor's has its direction while the motor drives the axis. Neither is NaN for t after
+  it was measured.
+
+A limit may be crossed before t has passed. Then a measured torque that differs, and an axis whose speed has grown
+against the torque for ten samples, are named as the possible cause.
 
 While the loop is open the laws run, so that an observer knows the disturbance when it is closed.
 
@@ -45,10 +49,10 @@ RUNNING, STOPPING, STOPPED, ENDED = 0.0, 1.0, 2.0, 3.0
 NONE, POSITION, SPEED, TORQUE, TEMPERATURE, FOLLOWING, NOT_FINITE, STATUS, ASKED = (
     0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0,
 )  # fmt: skip
-CLOCK, STILL, FROZEN, IGNORED, OPPOSED = 9.0, 10.0, 11.0, 12.0, 13.0
+CLOCK, STILL, FROZEN, IGNORED, OPPOSED, LOST, AGAINST = 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0
 REASONS = (
     "none", "position", "speed", "torque", "temperature", "following error", "not a number", "the rig's fault",
-    "asked", "clock", "standstill", "frozen", "torque ignored", "sensor",
+    "asked", "clock", "standstill", "frozen", "torque ignored", "sensor", "reading lost", "against the torque",
 )  # fmt: skip
 """Words for the channel ``reason`` of a record."""
 
@@ -59,8 +63,11 @@ UNBOUNDED = 1e300  # stands for no bound
 RATE = 0.25  # of the sample time, by which the clock's steps may be off for long
 SLID, SLIDING = 10.0, 0.05  # samples in a row, and of the speed limit: the axis slides
 CHANGED = 0.1  # of the torque limit: a command that has changed, or is large enough to be compared
-UNLIKE, OFFSET = 0.5, 0.05  # of the command, and of the torque limit: a measured torque that does not follow
-SENSED = 5.0  # of the answer time, for which a sensor may read against the motor: springs and inertia swing
+UNLIKE = 1.0 / 3.0  # of the command, and
+OFFSET = 0.05  # of the torque limit: a measured torque that does not follow
+SENSED = (
+    5.0  # of the answer time, that a changing sensor may read against the motor: springs and inertia swing
+)
 
 
 class Bounds(NamedTuple):
@@ -110,6 +117,12 @@ class Safety(NamedTuple):
     answered: Annotated[float, Par("N·m", "", "mean measured torque")]
     unlike: Annotated[float, Par("s", "", "for how long these have differed")]
     opposed: Annotated[float, Par("s", "", "for how long the sensor has read against the motor")]
+    steady: Annotated[float, Par("s", "", "for how long the sensor's torque has been the same")]
+    sensing: Annotated[float, Par("-", "", "1 once the sensor's torque has changed")]
+    lost: Annotated[float, Par("s", "", "for how long a torque that was measured has been NaN")]
+    against: Annotated[float, Par("s", "", "for how long the axis has moved against the torque")]
+    turned: Annotated[float, Par("rad/s", "", "its speed when that began")]
+    suspect: Annotated[float, Par("-", "", "the possible cause of a limit that is crossed: `REASONS`")]
 
 
 def bounds(limits: Limits, sample_time: float, travel: float = math.inf) -> Bounds:
@@ -169,11 +182,16 @@ def watch_state(y: Any, b: Any, s: Any) -> None:
         stop(TEMPERATURE, y.temperature, s)
 
 
+def leaps(step: float, b: Any, s: Any) -> bool:
+    """Whether the clock does not increase, or by more than a sample that was answered in time; after a pause it may."""
+    return not step > 0.0 or (step > b.sample_time + b.answer and s.begun > 2.0)
+
+
 def watch_clock(y: Any, b: Any, s: Any) -> None:
     """The rig's time advances, sample by sample."""
     step = y.time - s.time
     s.begun += 1.0
-    if not step > 0.0 or (step > b.sample_time + b.answer and s.begun > 2.0):
+    if leaps(step, b, s):
         stop(CLOCK, step, s)
     elif abs(step - b.sample_time) <= RATE * b.sample_time:
         s.astray = 0.0
@@ -216,8 +234,16 @@ def differ(a: float, b: float) -> bool:
 
 def watch_readings(y: Any, b: Any, s: Any) -> None:
     """Some reading changes while the command does."""
-    if differ(y.torque, s.motor):
+    if abs(y.torque - s.motor) > 0.0:  # two numbers
         s.alive = 1.0
+    if abs(y.sensor - s.sensor) > 0.0:
+        s.sensing = 1.0
+    if (s.alive != 0.0 and y.torque != y.torque) or (s.sensing != 0.0 and y.sensor != y.sensor):
+        s.lost += b.sample_time
+        if s.lost > b.answer:
+            stop(LOST, 0.0 if y.torque != y.torque and s.alive != 0.0 else 1.0, s)
+    else:
+        s.lost = 0.0
     if (
         y.position != s.position or differ(y.torque, s.motor) or differ(y.sensor, s.sensor)
         or differ(y.temperature, s.warmth)
@@ -249,13 +275,34 @@ def watch_torque(y: Any, b: Any, s: Any) -> None:
             s.unlike = 0.0
         if s.unlike > b.answer:
             stop(IGNORED, s.answered, s)
+    s.steady = s.steady + b.sample_time if y.sensor == s.sensor else 0.0
     if s.torque * s.velocity > 0.0 and abs(y.sensor) > CHANGED * b.torque:
         if y.sensor * s.torque > 0.0:
             s.opposed = 0.0
         else:
             s.opposed += b.sample_time
-            if s.opposed > SENSED * b.answer:
+            if s.opposed > SENSED * b.answer or min(s.opposed, s.steady) > b.answer:
                 stop(OPPOSED, y.sensor, s)
+
+
+def watch_direction(b: Any, s: Any) -> None:
+    """Whether the axis moves with or against the torque."""
+    if not s.torque * s.velocity < 0.0:
+        s.against = 0.0
+    else:
+        if s.against == 0.0:
+            s.turned = abs(s.velocity)
+        s.against += b.sample_time
+
+
+def suspected(b: Any, s: Any) -> float:
+    """The possible cause if a limit is crossed now; the sample that crosses it is no part of the evidence."""
+    enough = (SLID - 0.5) * b.sample_time
+    if s.unlike > enough:
+        return IGNORED
+    if s.against > enough and abs(s.velocity) > s.turned + SLIDING * b.speed:
+        return AGAINST
+    return NONE
 
 
 def watch_answer(y: Any, b: Any, s: Any) -> None:
@@ -269,6 +316,8 @@ def watch_answer(y: Any, b: Any, s: Any) -> None:
         s.still = 0.0
         s.same = 0.0
         s.astray = 0.0
+        s.lost = 0.0
+        s.against = 0.0
         s.least = s.torque
         s.most = s.torque
     elif watched and known:
@@ -276,8 +325,10 @@ def watch_answer(y: Any, b: Any, s: Any) -> None:
         watch_standstill(y, b, s)
         watch_readings(y, b, s)
         watch_torque(y, b, s)
+        watch_direction(b, s)
     # The times of a record increase, also after a clock that does not has become a reason to stop.
-    s.time = s.time + b.sample_time if watched and s.started != 0.0 and not y.time > s.time else y.time
+    leapt = watched and s.started != 0.0 and leaps(y.time - s.time, b, s)
+    s.time = s.time + b.sample_time if leapt else y.time
     s.started = 1.0
     s.motor = y.torque
     s.sensor = y.sensor
@@ -316,6 +367,8 @@ def ramp(b: Any, s: Any) -> None:
 
 def guarded(y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
     """One sample of the loop: watch, control, and stop if there is reason to. Returns the torque command, N·m."""
+    if s.state == RUNNING:
+        s.suspect = suspected(b, s)
     watch_motion(y, w, b, s)
     watch_state(y, b, s)
     watch_answer(y, b, s)
