@@ -113,7 +113,7 @@ def test_warm_up_compiles_the_loops_that_drives_have(loop, more):
     """A PID with a filter was compiled at its first recommendation."""
 
     def laws(text):
-        gains, own = loop_of(text)
+        gains, own, _ = loop_of(text)
         return Controller(gains, velocity_filter=own.get("filter", 0.0), sample_time=1e-3).laws
 
     warmed = [laws("kp=1,kd=1"), *map(laws, warm_up.LOOPS.values())]  # the demonstration's, and its own

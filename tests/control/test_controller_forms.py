@@ -88,7 +88,7 @@ def test_numbers_have_short_names_in_the_short_form_alone():
     assert short.with_numbers({"kp": 2.0}).gains == PD._replace(kp=2.0)
     changed = both.with_numbers({"loop_kp": 2.0, "feedforward_gain": 0.5})
     assert (changed.values()["loop_kp"], changed.values()["feedforward_gain"]) == (2.0, 0.5)
-    assert set(short.described()) == {"gains", "compensator"}
+    assert set(short.described()) == {"gains", "compensator", "reference_velocity"}
     assert set(both.described()["controller"]) >= {*both.blocks, "sample_time"}
 
 

@@ -107,7 +107,7 @@ SPOILED: list[tuple[str, Callable[[Table], Table], dict[str, str], str, str]] = 
         lambda t: with_(t, velocity=np.sin(7.3 * t["time"])),
         HEADER,
         "velocity-mismatch",
-        "warning",
+        "error",
     ),
     ("no units at all", lambda t: t, BARE, "assumed-unit", "warning"),
     (
