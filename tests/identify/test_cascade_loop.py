@@ -40,7 +40,7 @@ def recorded(loop: Loop) -> Experiment:
 
 
 def test_identify_and_recommend_read_the_same_description() -> None:
-    gains, beside = loop_to_recommend(TEXT)
+    gains, beside, _ = loop_to_recommend(TEXT)
     loop = loop_of(TEXT)
     assert gains == Cascade(loop.kv, loop.kvp, loop.kvi, loop.feed)
     assert beside == {"filter": loop.filter, "limit": loop.limit}

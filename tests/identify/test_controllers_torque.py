@@ -60,10 +60,10 @@ def test_a_bang_bang_torque_does_not_tell_the_friction_of_the_pendulum_that_it_s
     value, low, high = sliding_values(found, None)["fc"]
     assert value > 3.0 * LEVEL
     assert high - low < 0.5 * value
-    assert "neither the pendulum's inertia nor its weight" in found.doubt
+    assert "neither the inertia nor the weight of the pendulum" in found.doubt
     result = identify_axis([record], PENDULUM, ["coulomb"])
     assert not any(e.identified for e in result.estimates)
-    assert "under position control" in " ".join(result.notes)
+    assert "map the motor's own torque or current" in " ".join(result.notes)
 
 
 def test_a_pendulum_under_position_control_is_believed() -> None:
