@@ -28,7 +28,7 @@ MODEL: dict[str, Any] = {
     ("damage", "said"),
     [
         (lambda m: m["axis"].update(offset="x"), "axis.offset = 'x' must be a number"),
-        (lambda m: m["axis"].update(offset=math.nan), "axis.offset = nan must be a number"),
+        (lambda m: m["axis"].update(offset=math.nan), "axis.offset = nan must be a finite number"),
         (lambda m: m["axis"].update(gravity=[1.0]), "axis.gravity = [1.0] must be a number"),
         (lambda m: m.update(axis="x"), "axis = 'x' must be a table"),
         (lambda m: m.update(data="x"), "data = 'x' must be tables [[data]]"),

@@ -166,6 +166,8 @@ def place(kind: str, inertia: float, bandwidth: float, damping: float = 1.0) -> 
         if not value > 0.0 or not math.isfinite(value):
             raise ParameterError(f"controller: {name} = {value:g}{unit} must be greater than 0 and finite")
     w = 2.0 * math.pi * bandwidth
+    if not math.isfinite(w * w * w):
+        raise ParameterError(f"controller: bandwidth = {bandwidth:g} Hz is out of range; give the loop's own")
     if kind == "PR":
         return pr(inertia * w * w, 2.0 * inertia * damping * w)
     if kind == "PD":
