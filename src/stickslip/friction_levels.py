@@ -264,7 +264,8 @@ class _Curve:
         """How far the curve leaves a line through it, in parts of its torque; the line's level and slope."""
         v = np.linspace(*BEYOND, 20) * scale
         torque = np.array([self.torque(x) for x in v.tolist()])
-        slope = max(float(np.polyfit(v / v[-1], torque, 1)[0] / v[-1]), 0.0)
+        fitted: Any = np.polyfit(v / v[-1], torque, 1)
+        slope = max(float(fitted[0]) / float(v[-1]), 0.0)
         size = float(np.mean(np.abs(torque))) or 1.0
         if slope * v[-1] <= NO_LEVEL * size:
             slope = 0.0
