@@ -264,8 +264,9 @@ class _Curve:
         """How far the curve leaves a line through it, in parts of its torque; the line's level and slope."""
         v = np.linspace(*BEYOND, 20) * scale
         torque = np.array([self.torque(x) for x in v.tolist()])
-        fitted: Any = np.polyfit(v / v[-1], torque, 1)
-        slope = max(float(fitted[0]) / float(v[-1]), 0.0)
+        span = float(v[-1])
+        centred = v / span - np.mean(v / span)  # of size 1, whatever the unit of the speed
+        slope = max(float(centred @ torque) / float(centred @ centred) / span, 0.0)
         size = float(np.mean(np.abs(torque))) or 1.0
         if slope * v[-1] <= NO_LEVEL * size:
             slope = 0.0
