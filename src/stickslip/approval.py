@@ -39,7 +39,7 @@ def allow_code(allowed: bool = True, *, remember: bool = False) -> Generator[Non
     Parameters
     ----------
     allowed : bool
-        False refuses what nobody approved; so it is outside, too.
+        False refuses code that is not approved, as outside of it.
     remember : bool
         Whether what runs is known from now on, in other processes too.
     """

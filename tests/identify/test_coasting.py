@@ -63,3 +63,15 @@ def test_a_log_in_which_a_torque_acts_is_refused():
 def test_without_the_inertia_the_error_names_it():
     with pytest.raises(InputError, match='method="sliding" with inertia='):
         ss.identify(log(80.0), method="axis", law="coulomb")
+
+
+def test_an_inertia_that_is_not_positive_is_refused():
+    for inertia in (0.0, -1e-3):
+        with pytest.raises(InputError, match="must be greater than 0"):
+            ss.identify(log(80.0), method="sliding", law="coulomb", inertia=inertia)
+
+
+def test_the_torque_that_is_off_is_no_warning_of_a_coast_down():
+    logs = [log(80.0), log(-80.0)]
+    found = ss.identify(*logs, method="sliding", law="coulomb", inertia=INERTIA)
+    assert "no-torque" not in str(found.verdict)

@@ -104,7 +104,7 @@ static double {name}_map(double angle) /* rad; {unit} */
 """
     component = f"""component {name} "torque over the angle, the same in both directions, for feedforward";
 description \"\"\"
-What the drive must give at the angle that it is told, in {unit} times output-scale. {text_in("comp", note)}
+What the drive must give at the given angle, in {unit} times output-scale. {text_in("comp", note)}
 \"\"\";
 pin in float position "position, times position-scale in rad, 0 where the map has 0";
 pin in bit enable = 1 "while 0 the output is 0";

@@ -25,7 +25,7 @@ LOOKS = 5
 P = ParamSpec("P")
 Result = TypeVar("Result")
 Complaint = Callable[[float], RigError]
-"""The error for a call that took so many seconds"""
+"""Makes the error for a call from its duration, s"""
 
 
 class Budget:

@@ -324,7 +324,7 @@ class Ds402:
             self._beats += 1
 
     def _post(self, service: int, data: bytes) -> None:
-        """Send what nobody else may send, and know it again on a bus that hands back what is sent."""
+        """Send an object that no other master may send, and recognise its echo on the bus."""
         self._node.network.send_message(service, data)
         if self._echo is not False:
             self._sent[service, data] += 1

@@ -183,6 +183,8 @@ def identify(
     sources = sources_of(logs, _listed(hold_out), loop, reading, examiner, steady=kind.takes_steady_points)
     if pendulum:
         sources = [replace(s, findings=with_pendulum(s)) for s in sources]
+    if coasting:
+        sources = [replace(s, findings=[f for f in s.findings if f.code != "no-torque"]) for s in sources]
     refuse_same(sources)
     records = [s.record for s in sources]
     options = replace(options, held_out=sum(s.held_out for s in sources))

@@ -255,7 +255,7 @@ def verdict_on(p: Parameter, value: float, low: float, high: float, noise: Noise
 
 
 def too_wide(half: float, unit: str, scale: float) -> str:
-    """Explain why a half-width is too wide beside `scale`, the level of friction for a torque; empty if it is not.
+    """Explain why a half-width is too wide for `scale`, the level of friction for a torque; empty if it is not.
 
     A level that is not above 0 is no friction: it cannot measure the width of anything.
     """

@@ -45,8 +45,10 @@ def coasting_points(records: Sequence[Record], inertia: float) -> tuple[SlidingP
     Raises
     ------
     InputError
-        If a torque acts, or the axis hardly slides.
+        If the inertia is not positive, a torque acts, or the axis hardly slides.
     """
+    if not 0.0 < inertia < math.inf:
+        raise InputError(f"--inertia {inertia:g} must be greater than 0 and finite, in kg·m² (kg)")
     for record in records:
         for channel in TORQUES:
             if channel in record.channels and np.any(record[channel] != 0.0):
