@@ -2,7 +2,7 @@
 
     python benchmarks/ordinary_coverage.py                # all 720 cells, one record each: half an hour on two cores
     python benchmarks/ordinary_coverage.py --every 10 --law lugre
-    python benchmarks/ordinary_coverage.py --plain        # the regression on certain sliding alone: two minutes
+    python benchmarks/ordinary_coverage.py --plain        # gross sliding alone: five minutes
 
 Logs are those of `ordinary_logs.py`, in which nothing of the package takes part. A second table shows plain least
 squares: the inverse dynamics in four lines of numpy.
@@ -30,10 +30,9 @@ import numpy as np  # noqa: E402
 
 import ordinary_logs as logs  # noqa: E402
 from stickslip.errors import StickslipError  # noqa: E402
-from stickslip.identify.axis.agreed import sliding_values  # noqa: E402
-from stickslip.identify.axis.identify import identify_axis  # noqa: E402
+from stickslip.identification.axis import identify_axis  # noqa: E402
+from stickslip.identification.sliding import estimate_sliding  # noqa: E402
 from stickslip.identify.experiment import Experiment  # noqa: E402
-from stickslip.identify.regression.regression import regress_axis  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402
 
 AXIS = ServoAxis(drive_side="load")
@@ -85,31 +84,21 @@ def study(task: tuple[tuple[int, str, int, str, str, str], str, bool, float]) ->
     begin = time.process_time()
     try:
         if plain:
-            found = regress_axis([experiment], AXIS)
-            told = {
-                n: (*v, n != "offset" and v[2] <= 2.0 * v[1]) for n, v in sliding_values(found, None).items()
-            }
+            found = estimate_sliding([experiment], AXIS)
             level = found.numbers["fc"].value
-            told = {n: (*v[:3], v[3] and not (found.doubt or (n == "fc" and found.level_doubt)))
-                    for n, v in told.items()}  # fmt: skip
-            value, low, high = sliding_values(found, None)["offset"]
-            told["offset"] = (value, low, high, 0.5 * (high - low) <= 0.1 * level)
+            told = {n: (x.value, x.lower, x.upper, 0.0 < x.upper <= 2.0 * x.lower) for n, x in found.numbers.items()}
+            told["offset"] = (*told["offset"][:3], found.numbers["offset"].half <= 0.1 * level)
         else:
             result = identify_axis([experiment], AXIS, [law] if law else ("coulomb", "stribeck", "lugre"))
             told = {e.name: (e.value, e.lower, e.upper, e.identified) for e in result.estimates}
-            found = result.details["regression"]
+            found = result.details["sliding"]
     except StickslipError as error:
         print(f"{cell}: {error}", file=sys.stderr)
         return [], time.process_time() - begin
     seconds = time.process_time() - begin
     if found is not None:
-        low, high = found.interval("skew")
-        told["skew"] = (
-            found.numbers["skew"].value,
-            low,
-            high,
-            0.5 * (high - low) <= TOLD * experiment.period,
-        )
+        skew = found.numbers["skew"]
+        told["skew"] = (skew.value, skew.lower, skew.upper, skew.half <= TOLD * experiment.period)
     simple, rows = four_lines(log), list[Row]()
     for name in NAMES:
         if name not in told:
@@ -185,7 +174,7 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=50_000, help="seed of the first cell")
     parser.add_argument("--every", type=int, default=1, help="every so many cells")
     parser.add_argument("--law", default="", help="one law; otherwise chosen as `identify` does")
-    parser.add_argument("--plain", action="store_true", help="the regression on certain sliding alone")
+    parser.add_argument("--plain", action="store_true", help="gross sliding alone")
     parser.add_argument("--exponent", type=float, default=2.0, help="of friction's fall in the logs")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     parser.add_argument(

@@ -234,3 +234,8 @@ class Identification:
             "notes": list(self.notes),
             "measure_next": list(self.measure_next),
         }
+
+
+def missing_fall(misfit: Mapping[str, float]) -> float:
+    """By how much friction falls with velocity where the law has no fall, N·m (N); 0 where it misses none."""
+    return next((misfit[k] for k in ("fall_missing_Nm", "fall_missing_N") if k in misfit), 0.0)

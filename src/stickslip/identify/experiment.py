@@ -28,6 +28,8 @@ FASTER, WINDOW = 1.5, 0.1
 """Times as fast that the end of an experiment must be to be fitted instead of its start; s over which a speed is
 averaged."""
 FEWEST = 50
+MEAN_OVER = 0.02
+"""s over which `Experiment.velocity` averages."""
 ROUNDED = 0.02
 """Part of a row by which the times of evenly spaced samples may be off as they are written."""
 SPACING = 1e-3
@@ -119,6 +121,13 @@ class Experiment:
         assert self.reference is not None
         assert self.loop is not None
         return control_signal(self.loop, self.time, self.reference, self.position)
+
+    def velocity(self) -> Array:
+        """Velocity over `MEAN_OVER` seconds about every row, rad/s (m/s)."""
+        reach = max(1, round(0.5 * MEAN_OVER / self.period))
+        low = np.maximum(np.arange(self.time.size) - reach, 0)
+        high = np.minimum(np.arange(self.time.size) + reach, self.time.size - 1)
+        return (self.position[high] - self.position[low]) / (self.time[high] - self.time[low])
 
     def torque(self, axis: ServoAxis, velocity: Array) -> Array:
         """Torque on the axis, N·m, with the motor's own constants."""

@@ -19,8 +19,9 @@ import numpy as np
 
 from stickslip.config import Document, Table
 from stickslip.errors import InputError
+from stickslip.identification.sliding import SlidingPosterior
+from stickslip.identification.train import two_inertias
 from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.regression.regression import Regression
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
@@ -135,8 +136,8 @@ def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: st
 
 def told_train(found: Identification) -> TwoInertias | None:
     """Motor and load behind a spring, where the records told them."""
-    regression: Any = found.details.get("regression")
-    return regression.two_inertias if isinstance(regression, Regression) else None
+    sliding: Any = found.details.get("sliding")
+    return two_inertias(sliding) if isinstance(sliding, SlidingPosterior) else None
 
 
 def _law(model: Model, law: str) -> dict[str, Any]:

@@ -21,8 +21,7 @@ from stickslip.binding import NEGATIVE
 from stickslip.control.own_loop import ReferenceVelocity
 from stickslip.errors import ParameterError
 from stickslip.friction_levels import static_level
-from stickslip.identify.axis.falling import missing_fall
-from stickslip.identify.estimate import Estimate
+from stickslip.identify.estimate import Estimate, missing_fall
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.monte_carlo import draw_models
 from stickslip.machines.machine import Machine

@@ -14,18 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.axis.falling import missing_fall
-from stickslip.identify.axis.given_timing import CONTRADICTED
-from stickslip.identify.axis.in_sentences import on_timing
+from stickslip.identification.notes import CONTRADICTED, drift_of, on_timing
+from stickslip.identification.sliding import SlidingPosterior
 from stickslip.identify.axis.loop_check import OTHER_LOOP
 from stickslip.identify.axis.problem import mechanics_parameters
-from stickslip.identify.axis.result import perhaps_a_weight
-from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.doctor.change import DRIFTS_BY
+from stickslip.identify.estimate import Estimate, Identification, missing_fall
 from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.identify.motion import speeds_of
-from stickslip.identify.regression.drifting import DRIFTS_BY, drift_of
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 from stickslip.report.next_steps import Step, next_steps
@@ -45,8 +42,6 @@ repeats with the motion, and so over the position: of 43 orders that no machine 
 logs with cogging (`benchmarks/ordinary_logs.py`), 39 were smaller, and none of 256 that were there."""
 OF_ONE = re.compile(r"\b(determines?|distinguish) it\b")
 """How a verdict speaks of its number."""
-MOST_NAMED = 4
-"""Orders that one may be as well."""
 OWN_WORDS = {
     "fc": "Coulomb torque", "fs": "static (break-away) torque", "fs_positive": "break-away torque, v > 0",
     "stiffness": "stiffness at rest", "fs_negative": "break-away torque, v < 0",
@@ -200,8 +195,8 @@ def of_several(why: str, names: Sequence[str]) -> str:
 
 def timing_of(found: Identification) -> list[str]:
     """When the torque acted, in a sentence."""
-    regression = found.details.get("regression")
-    return on_timing(regression) if isinstance(regression, Regression) else []
+    sliding = found.details.get("sliding")
+    return on_timing(sliding) if isinstance(sliding, SlidingPosterior) else []
 
 
 def trusted(found: Identification, reasons: Sequence[str]) -> str:
@@ -244,17 +239,14 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
     held, own = (found.misfit.get(f"{p}force_relative", math.nan) for p in ("held_out_", ""))
     if held > ELSEWHERE * own:
         out.append(f"on records held out its force error is {percent(held)}, {percent(own)} on those fitted")
-    either, _ = perhaps_a_weight(found.estimates)
-    if either and found["fc"].identified:
-        out.append(either)
     if any(OTHER_LOOP in note for note in found.notes):
         out.append("the record shows another controller than the loop given")
     if any(note.startswith(CONTRADICTED) for note in found.notes):
         out.append(f"{CONTRADICTED[0].lower()}{CONTRADICTED[1:]}")
     warned = [f for f in found.findings if getattr(f, "level", "") == "warning"]
-    regression = found.details.get("regression")
-    if isinstance(regression, Regression) and not any(f.code == "change" for f in warned):
-        drift = drift_of(regression.numbers, regression.rows)
+    posterior = found.details.get("sliding")
+    if isinstance(posterior, SlidingPosterior) and not any(f.code == "change" for f in warned):
+        drift = drift_of(posterior)
         if drift is not None and abs(drift.share) >= DRIFTS_BY:
             out.append(
                 f"friction {drift} over the record: warm the axis up first, or cut with --from and --to"
@@ -268,10 +260,11 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
 
 def mostly_waves(found: Identification, sliding: Sliding) -> str:
     """Return that the torque over the position is most of what the model misses; empty if it is not."""
-    regression = found.details.get("regression")
-    if not isinstance(regression, Regression) or regression.waves**2 < 0.5 * sliding.rms**2:
+    posterior = found.details.get("sliding")
+    waves = [size for _, size in posterior.waves] if isinstance(posterior, SlidingPosterior) else []
+    if not waves or sum(x * x for x in waves) < sliding.rms**2:
         return ""
-    size = quantity(float(np.max(regression.harmonics)), unit_in(found, "N·m"))
+    size = quantity(max(waves), unit_in(found, "N·m"))
     return f", mostly a torque over the position (cogging, {size}), which no friction law contains"
 
 
@@ -288,10 +281,10 @@ def percent(share: float) -> str:
 def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
     """How far the model's torque is from the measured one, in sentences."""
     out, effort = list[str](), "force" if linear(found) else "torque"
-    unit, regression = unit_in(found, "N·m"), found.details.get("regression")
+    unit, posterior = unit_in(found, "N·m"), found.details.get("sliding")
     if sliding is not None:
         speeds = (
-            within_speeds(regression, unit_in(found, "rad/s")) if isinstance(regression, Regression) else ""
+            within_speeds(posterior, unit_in(found, "rad/s")) if isinstance(posterior, SlidingPosterior) else ""
         )
         out.append(
             f"In gross sliding ({100.0 * sliding.share:.0f} % of the record{speeds}) the model's {effort} is "
@@ -309,8 +302,8 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
         out.append(
             f"The loop, simulated with the model, makes a drive signal {percent(off)} off the recorded one."
         )
-    if isinstance(regression, Regression):
-        out += around(regression, found)
+    if isinstance(posterior, SlidingPosterior):
+        out += around(posterior, found)
     if (rms := found.misfit.get("rms_N" if linear(found) else "rms_Nm")) is not None:
         what = "force" if linear(found) else "torque"
         out.append(
@@ -319,36 +312,18 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
     return out
 
 
-def around(regression: Regression, found: Identification) -> list[str]:
-    """The torque over the position that is told, in a sentence; nothing where none is."""
-    turn, per = (1.0, "a metre") if linear(found) else (2.0 * math.pi, "a revolution")
+def around(posterior: SlidingPosterior, found: Identification) -> list[str]:
+    """The torque over the position that was found, in a sentence; nothing where there is none."""
+    turn, per = (1.0 / (2.0 * math.pi), "a metre") if linear(found) else (1.0, "a revolution")
     listed = [
-        f"{quantity(size, unit_in(found, 'N·m'))} at {turn * order:.3g} {per}{or_else(turn, alike)}"
-        for order, size, alike in orders_told(regression)
-    ]
+        f"{quantity(size, unit_in(found, 'N·m'))} at {turn * number:.3g} {per}"
+        for number, size in posterior.waves if size > AMPLITUDE * posterior.friction
+    ]  # fmt: skip
     if not listed:
         return []
     return [
         f"Torque over the position (cogging, unbalance), allowed for but not part of the law: {', '.join(listed)}."
     ]
-
-
-def orders_told(regression: Regression) -> list[tuple[float, float, tuple[float, ...]]]:
-    """Of the orders found those that are more than the form of a law leaves: cycles a radian (m), amplitude in N·m
-    (N), and the orders that each may be as well."""
-    found = zip(regression.orders, regression.harmonics.tolist(), regression.alike, strict=True)
-    return [(order, size, alike) for order, size, alike in found if size > AMPLITUDE * regression.friction]
-
-
-def or_else(turn: float, alike: Sequence[float]) -> str:
-    """Which orders it may be as well, and what would tell."""
-    if not alike:
-        return ""
-    named = [f"{turn * order:.3g}" for order in sorted(alike)[:MOST_NAMED]]
-    more = " and others" if len(alike) > MOST_NAMED else ""
-    return (
-        f" (the record does not tell it from {', '.join(named)}{more}; record slow turns at constant speed)"
-    )
 
 
 def either_way(found: Identification) -> list[str]:
@@ -366,9 +341,9 @@ def either_way(found: Identification) -> list[str]:
     ]
 
 
-def within_speeds(regression: Regression, unit: str) -> str:
+def within_speeds(posterior: SlidingPosterior, unit: str) -> str:
     """The speeds of certain sliding: of others the record says nothing."""
-    return f", {regression.slowest:.3g} to {regression.fastest:.3g} {unit}"
+    return f", {posterior.slowest:.3g} to {posterior.fastest:.3g} {unit}"
 
 
 def plain_there(found: Identification, sliding: Sliding) -> str:

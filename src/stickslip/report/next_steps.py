@@ -11,9 +11,9 @@ from pathlib import Path
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import REFERENCE_VELOCITY, USUAL_TIME
 from stickslip.errors import InputError
+from stickslip.identification.sliding import SlidingPosterior
 from stickslip.identify.estimate import Identification
 from stickslip.identify.needed_motions import MOTIONS, experiment_for
-from stickslip.identify.regression.regression import Regression
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import SAME_COUNTS, Record, counts_of_step, encoder_step, row_period
 from stickslip.report.after_a_map import after_a_map
@@ -55,12 +55,9 @@ def weighed(found: Identification, files: Sequence[str], model_file: str) -> lis
     if not isinstance(axis, ServoAxis) or axis.gravity == "pendulum" or found.method == "cogging":
         return []
     told = any(f.code == "gravity" and "--pendulum" in f.remedy for f in found.findings)
-    regression = found.details.get("regression")
-    if not told and isinstance(regression, Regression) and axis.motion != "linear":
-        once = zip(regression.orders, regression.harmonics.tolist(), strict=True)
-        told = any(
-            abs(math.tau * order - 1.0) < 1e-3 and x > HEAVY * abs(regression.friction) for order, x in once
-        )
+    sliding = found.details.get("sliding")
+    if not told and isinstance(sliding, SlidingPosterior) and axis.motion != "linear":
+        told = any(abs(order - 1.0) < 1e-3 and x > HEAVY * sliding.friction for order, x in sliding.waves)
     if not told:
         return []
     said = (

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.identification.rows import LATEST, OVERLAP, Block
+from stickslip.identification.sliding import SlidingPosterior
+from stickslip.identification.windows import apply_at, window_weights
 from stickslip.identify.estimate import Identification
-from stickslip.identify.fit.smooth import seen
 from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.identify.regression.force_error import model_torque
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.regression.regression import Regression
-from stickslip.identify.regression.sliding_rows import SlidingRows
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -25,7 +25,6 @@ WORSE = 1.05
 SMALL = 0.01
 """Of the torque where the axis slides: a model that misses less is not beaten by another."""
 
-ACCELERATION, SPEED, DIRECTION = range(3)
 POINTS = 4000
 """Rows of a record that are looked at, at most: every second, third ... of more."""
 
@@ -85,56 +84,53 @@ class Sliding:
 @lru_cache(maxsize=1)  # the head, its pictures and the command line ask for the same
 def sliding_of(found: Identification) -> Sliding | None:
     """Torque in gross sliding; None where that was not looked at, or the law says no torque."""
-    regression, mechanics = found.details.get("regression"), found.details.get("mechanics")
-    if not isinstance(regression, Regression) or not isinstance(mechanics, Mechanics):
+    posterior, mechanics = found.details.get("sliding"), found.details.get("mechanics")
+    if not isinstance(posterior, SlidingPosterior) or not isinstance(mechanics, Mechanics):
         return None
     if found.model is None or found.model.law.steady is None:
         return None
-    rows = regression.rows
-    skew = regression.numbers["skew"].value
-    beside = np.split(regression.beside_law, np.cumsum([r.time.size for r in rows])[:-1])
-    parts = [part(r, b, skew, mechanics) for r, b in zip(rows, beside, strict=True)]
-    columns = {k: np.concatenate([p[k] for p in parts]) for k in parts[0]}
-    velocity = columns["velocity"]
-    record = np.repeat(np.arange(len(parts)), [p["time"].size for p in parts])
-    steady = resisting_torque(found.model, velocity)
-    sizes = [
-        (r.signals.time.size, r.places.size * max(1, int(r.window.width / r.signals.period))) for r in rows
-    ]
+    rows, skew = posterior.rows, posterior.numbers["skew"].value
+    narrow = min(b.width for b in rows.blocks)
+    blocks = [(i, b) for i, b in enumerate(rows.blocks) if b.width == narrow]
+    places = np.concatenate([_thinned(np.flatnonzero(rows.block == i)) for i, _ in blocks])
+    record = np.concatenate([np.full(_thinned(b.centres).size, k) for k, (_, b) in enumerate(blocks)])
+    inertial = mechanics.inertia * rows.acceleration[places] + posterior.beside[places]
+    position = rows.position[places]
+    if mechanics.gravity:
+        inertial = inertial + mechanics.gravity * np.sin(position - mechanics.gravity_angle)
+    velocity, measured = rows.velocity[places], posterior.torque[places]
+    seen = sum(b.centres.size * max(1, int(b.half / b.record.period / OVERLAP)) for _, b in blocks)
     return Sliding(
-        **columns, record=record, model=columns["inertial"] + steady + mechanics.offset, certain=True,
-        share=min(1.0, sum(s for _, s in sizes) / sum(n for n, _ in sizes)),
-        whole=tuple(acted(r, skew) for r in rows), plain=left_by_plain(regression, found.details.get("inverse")),
+        np.concatenate([b.record.time[_thinned(b.centres)] for _, b in blocks]), velocity, position, measured,
+        inertial + resisting_torque(found.model, velocity) + mechanics.offset, inertial, record, True,
+        min(1.0, seen / sum(b.record.time.size for _, b in blocks)), tuple(acted(b, skew) for _, b in blocks),
+        left_by_plain(posterior, places, found.details.get("inverse")),
     )  # fmt: skip
 
 
-def left_by_plain(regression: Regression, inverse: Any) -> float:
-    """What the plain inverse dynamics leaves of the torque in gross sliding, N·m (N)."""
+def _thinned(places: Any) -> Any:
+    """At most `POINTS` of some places."""
+    return places[:: max(1, math.ceil(places.size / POINTS))]
+
+
+def left_by_plain(posterior: SlidingPosterior, places: Any, inverse: Any) -> float:
+    """RMS of what the plain inverse dynamics leaves of the torque in those rows, N·m (N)."""
     if not isinstance(inverse, InverseDynamics):
         return math.nan
-    return regression.left_by(inverse.numbers())
+    rows, own = posterior.rows, inverse.numbers()
+    told = own["inertia"] * rows.acceleration[places] + own["sigma2"] * rows.velocity[places]
+    told = told + own["fc"] * rows.sign[places] + own["offset"]
+    angle = rows.position[places]
+    told = told + own.get("gravity_sin", 0.0) * np.sin(angle) + own.get("gravity_cos", 0.0) * np.cos(angle)
+    return float(np.sqrt(np.mean((posterior.torque[places] - told - posterior.beside[places]) ** 2)))
 
 
-def part(rows: SlidingRows, beside: Array, skew: float, mechanics: Mechanics) -> dict[str, Array]:
-    """What one record says, by the names of `Sliding`; `beside`: what no law and no rigid axis holds, N·m (N)."""
-    step = max(1, math.ceil(rows.time.size / POINTS))
-    some = slice(None, None, step)
-    inertial = mechanics.inertia * rows.fixed[some, ACCELERATION] + beside[some]
-    if mechanics.gravity:
-        inertial = inertial + mechanics.gravity * np.sin(rows.position[some] - mechanics.gravity_angle)
-    return {
-        "time": rows.time[some], "velocity": rows.speed[some], "position": rows.position[some],
-        "measured": rows.torque(skew)[some], "inertial": inertial,
-    }  # fmt: skip
-
-
-def acted(rows: SlidingRows, skew: float) -> tuple[Array, Array]:
+def acted(block: Block, skew: float) -> tuple[Array, Array]:
     """Time and torque that acted, of a whole record through the same window."""
-    signals = rows.signals
-    (drive,) = seen(signals.drive, rows.window.weights(0, late=skew))
-    reach = rows.window.reach
-    inside = slice(reach, max(drive.size - reach, reach + 1))
-    return signals.time[inside], drive[inside]
+    weights = window_weights(block.half, block.record.period, (0,), skew)
+    edge = LATEST + 1 + weights.shape[1] // 2
+    padded = np.pad(block.record.drive, edge, mode="edge")
+    return block.record.time, apply_at(padded, np.arange(block.record.time.size) + edge, weights)[:, 0]
 
 
 def over_all_rows(found: Identification) -> Sliding | None:

@@ -8,9 +8,9 @@ from typing import Any, cast
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.identification.memo import EstimateSliding
 from stickslip.identify.doctor import Diagnosis, examine, of_arrays
 from stickslip.identify.doctor.steady_table import is_steady_table
-from stickslip.identify.regression.regressions import Regress
 from stickslip.in_python import in_python
 from stickslip.readers.cut import pieces
 from stickslip.readers.remembered import CODES
@@ -24,7 +24,7 @@ class Examiner:
     """The doctor of `identify`: an error ends it."""
 
     accept: Sequence[str]
-    regress: Regress
+    estimate: EstimateSliding
     tell: Callable[[str], None]
     said: set[str] = field(default_factory=set[str])
     """Lines that were told."""
@@ -50,7 +50,7 @@ class Examiner:
             if data["code"] in CODES:
                 self.say(named(log), Finding.from_data(data), record)
         parts, short = ([record], []) if is_steady_table(record) else pieces(record)
-        every = [examine(part, accept=self.accept, regress=self.regress) for part in parts]
+        every = [examine(part, accept=self.accept, estimate=self.estimate) for part in parts]
         for found in every:
             if found.errors:
                 raise InputError(f"{named(log)}: {found.errors[0].line()}; see {doctor_of(log)}")

@@ -17,6 +17,7 @@ from stickslip.arguments import arguments_checked
 from stickslip.control.own_loop import ReferenceVelocity, loop_text
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
+from stickslip.identification.memo import SlidingMemo
 from stickslip.identify.doctor import Diagnosis
 from stickslip.identify.doctor.steady_table import is_steady_table
 from stickslip.identify.estimate import Identification, silent
@@ -26,7 +27,6 @@ from stickslip.identify.held import held_in
 from stickslip.identify.methods import method_named, methods_by_option
 from stickslip.identify.methods.method import Method, Options, given_in
 from stickslip.identify.on_a_line import along_a_line, worded
-from stickslip.identify.regression.regressions import Regressions
 from stickslip.model import Model
 from stickslip.readers.convert import pendulum_before_gear
 from stickslip.readers.cut import file_rows
@@ -165,21 +165,21 @@ def identify(
         One line that names the thing, its value and the remedy; an error of the doctor, too.
     """
     kind = method_named(method)
-    regress = Regressions()
+    estimate = SlidingMemo()
     laws, left_out = laws_of(law)
     known = dict(values or {}) | ({} if inertia is None else {"inertia": inertia})
     options = Options(
         laws, known, (*frozen, *(["inertia"] if inertia is not None and method == "axis" else [])), tuple(free),
         model if model is None or isinstance(model, Model) else Model.from_file(model), noise, torque_channel, elements,
         threshold, 0, inverse, per_direction, pendulum, drive_gain, reading.get("torque_constant"), resistance,
-        loop_output, extra_torque, torque_is, delay, harmonics, load, intervals, robust, regress, progress,
+        loop_output, extra_torque, torque_is, delay, harmonics, load, intervals, robust, estimate, progress,
         position_map, reading.get("force_constant"),
     )  # fmt: skip
     given = given_in(options, inertia=inertia is not None, loop=bool(loop), hold_out=bool(_listed(hold_out)))
     kind.refuse_unused(given, methods_by_option())
     coasting = method == "sliding" and inertia is not None
     expected = ["missing-column"] if kind.takes_current else ["no-torque"] if coasting else []
-    examiner = Examiner((*accept, *expected), regress, tell)
+    examiner = Examiner((*accept, *expected), estimate, tell)
     sources = sources_of(logs, _listed(hold_out), loop, reading, examiner, steady=kind.takes_steady_points)
     if pendulum:
         sources = [replace(s, findings=with_pendulum(s)) for s in sources]

@@ -15,7 +15,11 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.axis.result import speed_of
+from stickslip.identification.memo import EstimateSliding
+from stickslip.identification.posterior import falls_of
+from stickslip.identification.search import Asked
+from stickslip.identification.sliding import SlidingPosterior
+from stickslip.identification.windows import POWER
 from stickslip.identify.cogging import angle_of, chosen_terms, map_of
 from stickslip.identify.cogging.fitting import Fit
 from stickslip.identify.cogging.orders import (
@@ -31,14 +35,13 @@ from stickslip.identify.cogging.result import ROUND, Choice, estimates_of, pictu
 from stickslip.identify.cogging.rows import Places
 from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.identify.experiment import Experiment
-from stickslip.identify.regression.regression import Regression
-from stickslip.identify.regression.regressions import Regress
-from stickslip.identify.regression.strokes import stacked, strokes_of
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
+FALLS = np.geomspace(0.003, 0.3, 7)
+"""Parts of the highest speed over which friction may fall."""
 SECTORS = 12
 """Of a turn, each of which must be passed in both directions."""
 RESOLVED = 1.0
@@ -96,7 +99,7 @@ class OverAngle:
         factor = gain * (np.ones(experiment.time.size) if experiment.supply is None else experiment.supply)
         acted = experiment.time - self.skew
         angle = np.interp(acted, experiment.time, experiment.position)
-        direction = np.sign(np.interp(acted, experiment.time, speed_of(experiment)))
+        direction = np.sign(np.interp(acted, experiment.time, experiment.velocity()))
         torque = self.found.beside(angle) + direction * self.found.ripple(angle)
         own = np.divide(torque, factor, out=np.zeros_like(torque), where=factor != 0.0)
         return replace(experiment, drive=experiment.signal() - own)
@@ -121,7 +124,7 @@ class OverAngle:
 
 
 def over_angle(
-    experiments: Sequence[Experiment], axis: ServoAxis, skew: float | None, regress: Regress
+    experiments: Sequence[Experiment], axis: ServoAxis, skew: float | None, estimate: EstimateSliding
 ) -> OverAngle:
     """The map over the angle that the records show.
 
@@ -132,8 +135,8 @@ def over_angle(
     axis : ServoAxis
     skew : float or None
         s by which the torque's column lies behind the torque that acted, where it is known.
-    regress : callable
-        The regression on certain sliding.
+    estimate : callable
+        `stickslip.identification.sliding.estimate_sliding`, or a memo of it.
 
     Raises
     ------
@@ -144,7 +147,7 @@ def over_angle(
         raise InputError("the positions are lengths; give the motor's angle")
     if any(t.drive is None or t.closed_loop for t in experiments):
         raise InputError("it is found in the recorded torque, not in a simulated loop; leave --loop out")
-    sliding = regress(experiments, axis, skew=skew)
+    sliding = estimate(experiments, axis, Asked(axis.gravity == "pendulum", skew=skew))
     places = places_of(sliding, axis)
     refuse_narrow(places)
     orders = orders_of(places)
@@ -177,23 +180,28 @@ def over_angle(
     return OverAngle(the_map, tuple(estimates), choice, lag, notes, pictures, sliding.numbers["skew"].value)
 
 
-def places_of(sliding: Regression, axis: ServoAxis) -> SlidingPlaces:
-    """The rows of certain sliding, with what friction and inertia may be beside Coulomb's level and slope."""
+def places_of(sliding: SlidingPosterior, axis: ServoAxis) -> SlidingPlaces:
+    """The rows of the narrowest windows, with what friction and inertia may be beside Coulomb's level and slope."""
     rows = sliding.rows
-    fixed, speed, gone = stacked(rows, "fixed"), stacked(rows, "speed"), stacked(rows, "gone")
-    angle, direction = stacked(rows, "position"), fixed[:, 2]
-    ways = np.quantile(gone, [0.1, 0.5]).tolist()
+    width = min(b.width for b in rows.blocks)
+    narrow = np.isin(rows.block, [i for i, b in enumerate(rows.blocks) if b.width == width])
+    angle, direction = rows.position[narrow], rows.sign[narrow]
+    speed, acceleration = rows.velocity[narrow], rows.acceleration[narrow]
+    gone = rows.at_centres(lambda r: r.since)[narrow]
+    ways = np.maximum(np.quantile(gone, [0.1, 0.5]), 1e-12).tolist()
+    falls = falls_of(rows, rows.fastest * FALLS, (2.0,)).alike[narrow]
     others = [
-        stacked(rows, "jerk"), *stacked(rows, "falling")[:, ::3].T,
-        *(direction * np.exp(-gone / way) for way in ways), direction * np.abs(fixed[:, 0]), np.abs(speed),
+        rows.jerk[narrow], *falls.T, *(direction * np.exp(-gone / way) for way in ways),
+        direction * np.abs(acceleration), np.abs(speed),
     ]  # fmt: skip
     if axis.gravity == "pendulum":
         others += [np.sin(angle), np.cos(angle)]
+    fixed = np.column_stack([acceleration, speed, direction, np.ones(speed.size)])
     core = np.column_stack([fixed, np.abs(speed) * speed])
-    torque = np.concatenate([r.torque(sliding.numbers["skew"].value) for r in rows])
-    width = np.concatenate([np.abs(r.speed) * r.window.width for r in rows])
+    half = np.concatenate([np.full(b.centres.size, b.half) for b in rows.blocks])[narrow]
+    seen = np.abs(speed) * half / math.sqrt(2 * POWER + 3)
     return SlidingPlaces(
-        angle, torque, direction, speed, fixed[:, 0], strokes_of(rows).astype(np.intp), width,
+        angle, sliding.torque[narrow], direction, speed, acceleration, rows.stroke[narrow].astype(np.intp), seen,
         np.zeros(angle.size), np.zeros((angle.size, 2)), independent(core, np.column_stack(others)),
     )  # fmt: skip
 

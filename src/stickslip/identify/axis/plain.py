@@ -9,13 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.axis.agreed import SAME
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.force_error import plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics
-from stickslip.identify.regression.regression import QUANTILE, Regression
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.simulation.recorded_input.simulation import Mechanics
@@ -29,36 +27,19 @@ POSITIVE = ("inertia", "fc", "sigma2", "gravity")
 def inverse_identification(
     found: InverseDynamics,
     axis: ServoAxis,
-    sliding: Regression | None = None,
     validation: Sequence[Experiment] = (),
 ) -> Identification:
     """The inverse dynamics as an `Identification`, its friction as the law ``coulomb``.
 
     Per direction the law is asymmetric, unless a constant torque above the friction acts along: then it has the mean of
-    both directions, and the constant torque half of their difference. Intervals are widened to hold what certain
-    sliding says (`stickslip.identify.regression.regression`) where both contradict each other; `validation` records
-    give the held-out error.
+    both directions, and the constant torque half of their difference. `validation` records give the held-out error.
     """
     model, mechanics = parts_of(found)
     names, units, values, covariance = of_the_model(found, model)
     std = np.sqrt(np.diag(covariance))
     estimates: list[Estimate] = []
-    notes: list[str] = []
-    # Where each direction has its own, none is the mean of both that certain sliding tells.
-    both = ("inertia",) if "fc_negative" in names else ("inertia", "fc", "sigma2", "offset")
     for name, unit, value, spread in zip(names, units, values.tolist(), std.tolist(), strict=True):
         low, high = value - 1.96 * spread, value + 1.96 * spread
-        if sliding is not None and name in both:
-            other, half = sliding.numbers[name].value, QUANTILE * sliding.numbers[name].std
-            apart = abs(other - value) > math.hypot(half, 0.5 * (high - low))
-            if apart and abs(other - value) > SAME * max(
-                abs(value), abs(found.coulomb) if name == "offset" else 0.0
-            ):
-                low, high = min(low, other), max(high, other)
-                notes.append(
-                    f"{name}: {value:.4g} here, {other:.4g} {unit} in gross sliding "
-                    "(reversals, stops and the hold of the torque left out); the interval holds both."
-                )
         if name.startswith(POSITIVE) and name != "gravity_angle":
             good = low > 0.0 and high <= 2.0 * low
         else:
@@ -72,7 +53,7 @@ def inverse_identification(
         "inverse dynamics", model, tuple(estimates), covariance / np.outer(std, std),
         misfit,
         (f"Position filtered at {found.cutoff:.4g} Hz, decimated to {found.band:.4g} Hz; intervals allow for the "
-         "correlation of the residuals.", *notes),
+         "correlation of the residuals.",),
         details={"inverse": found, "axis": axis, "mechanics": mechanics,
                  "classic_std": dict(zip(found.names, found.std.tolist()))},
     )  # fmt: skip

@@ -16,6 +16,8 @@ import numpy as np
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding, sorted_findings
+from stickslip.identification.memo import EstimateSliding
+from stickslip.identification.sliding import estimate_sliding
 from stickslip.identify.doctor import (
     by_profile,
     change,
@@ -31,8 +33,6 @@ from stickslip.identify.doctor import (
 )
 from stickslip.identify.doctor.steady_table import examine_table, is_steady_table
 from stickslip.identify.doctor.view import View
-from stickslip.identify.regression.regression import regress_axis
-from stickslip.identify.regression.regressions import Regress
 from stickslip.in_python import in_python
 from stickslip.readers.cut import range_words, taken
 from stickslip.record import Record
@@ -149,7 +149,7 @@ def findings_in_python(findings: Sequence[Finding], record: Record) -> tuple[Fin
 
 def examine(
     record: Record, *, stribeck_velocity: float | None = None, accept: Sequence[str] = (),
-    regress: Regress = regress_axis,
+    estimate: EstimateSliding = estimate_sliding,
 ) -> Diagnosis:  # fmt: skip
     """Check a record for everything that would spoil an identification.
 
@@ -161,9 +161,8 @@ def examine(
         rad/s (or m/s): whether the record has speeds near it. Without it, near a twentieth of the usual speed.
     accept : sequence of str
         Codes of errors that count as warnings, since the caller knows better; those of `FINAL` stay errors.
-    regress : callable
-        The regression on certain sliding; a `stickslip.identify.regression.regressions.Regressions` keeps it for who
-        asks again.
+    estimate : callable
+        `estimate_sliding`, or a memo of it that keeps the result for the identification.
 
     Raises
     ------
@@ -176,7 +175,7 @@ def examine(
     if is_steady_table(record):
         kept, found = examine_table(record)
         return Diagnosis(tuple(sorted_findings(accepted(found, accept))), kept)
-    view = View(record, regress)
+    view = View(record, estimate)
     reading = cast("Mapping[str, Any]", record.meta.get("reading", {}))
     findings = [Finding.from_data(f) for f in reading.get("findings", [])]
     # Absurd numbers overflow; whatever comes of them compares as false.

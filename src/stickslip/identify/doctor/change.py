@@ -17,12 +17,14 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip.finding import Finding
+from stickslip.identification.notes import drift_of
 from stickslip.identify.doctor.view import Array, Mask, Smooth, View, row
 from stickslip.identify.fit.profile import long_run
-from stickslip.identify.regression.drifting import DRIFTS_BY, drift_of
 
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 
+DRIFTS_BY = 0.05
+"""Of friction at the first row, that a drift is worth a warning from."""
 MOST_ROWS = 30_000
 BLOCKS, FEWEST_BLOCKS = 16, 8
 PER_BLOCK = 150
@@ -83,9 +85,9 @@ def changes(view: View) -> Iterator[Finding]:
 
 
 def _drifting(view: View) -> Iterator[Finding]:
-    """Friction that drifts evenly with time, as certain sliding shows it, by more than a few percent."""
+    """Friction that drifts with time, as gross sliding shows it, by more than a few percent."""
     found = None if view.smooth is None else view.sliding  # times that are none make neither
-    drift = None if found is None else drift_of(found.numbers, found.rows)
+    drift = None if found is None else drift_of(found)
     if drift is None or abs(drift.share) < DRIFTS_BY:
         return
     message = f"friction {drift} over the record: what is identified is that of its middle"

@@ -17,6 +17,7 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import NEVER, Array, Smooth, View
 from stickslip.identify.fit.shifts import least_between, shifts_looked_at
+from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.readers.convert import pendulum_before_gear
 
 ROWS = 20_000
@@ -35,8 +36,6 @@ BOTH = 0.05
 """Share of the moving rows in either direction below which friction is not told from a constant torque."""
 STRETCHES, SURE = 12, 3.0
 """Stretches of the jackknife of friction's work, and its standard deviations below zero that make an error."""
-UNEXPLAINED = 0.5
-"""Of the torque, that may be left in certain sliding for a time to be believed."""
 LATE, STROKE, EARLY = 0.12, 0.25, 0.03
 """s over which such a delay is looked for: farther only within a part of the usual stroke, so far in any case."""
 BETTER = 2.0
@@ -144,12 +143,11 @@ def skew(view: View) -> Iterator[Finding]:
     smooth = usable(view)
     if smooth is None or (found := view.sliding) is None:
         return
-    low, high = found.interval("skew")
-    late, half, row = 0.5 * (low + high), 0.5 * (high - low), found.period
-    # Only what accelerates the axis tells a time; ringing and torque over the position pass for a skew of many rows,
-    # and for an inertia that is known badly.
-    shows = found.shows_inertia and max(b.relative for b in found.bands) <= UNEXPLAINED
-    sure = shows and found.numbers["inertia"].told_to_two and found.confirmed("skew")
+    number, inertia = found.numbers["skew"], found.numbers["inertia"]
+    late, half, row = number.value, number.half, found.period
+    # Only what accelerates the axis tells a time.
+    shows = inertia.lower > 0.0
+    sure = shows and inertia.upper <= RATIO * inertia.lower
     untold = not sure or half > MANY * row
     if untold and (at_reversals := _skew_at_reversals(smooth)) is not None:
         late, sure = at_reversals, True
@@ -277,9 +275,10 @@ def _offset(view: View, smooth: Smooth, plain: Fit) -> Iterator[Finding]:
     offset, part, found = plain.values[3], "", view.sliding
     weighs = abs(offset) > WEIGHT * float(np.std(smooth.torque)) and plain.explained > 0.5
     large = weighs and _both_ways(smooth)
-    if found is not None and not found.doubt:
-        (low, high), coulomb = found.interval("fc"), found.numbers["fc"].value
-        if high - low < 2.0 * TOLD * coulomb:
+    if found is not None:
+        level = found.numbers["fc"]
+        coulomb = level.value
+        if level.half < TOLD * coulomb:
             offset = found.numbers["offset"].value
             large = abs(offset) > WEIGHT * coulomb
             part = f", {100 * abs(offset) / coulomb:.0f} % of Coulomb friction"

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identification.memo import EstimateSliding
+from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.filters import ZeroPhase, butterworth_poles
-from stickslip.identify.regression.regression import Regression, regress_axis
-from stickslip.identify.regression.regressions import Regress
 from stickslip.machines.servo import ServoAxis
 from stickslip.readers.cut import file_rows
 from stickslip.record import Record, encoder_step
@@ -120,8 +120,8 @@ def is_number(values: Array) -> Mask:
 class View:
     """A record as the checks see it."""
 
-    def __init__(self, record: Record, regress: Regress = regress_axis) -> None:
-        self.record, self.regress = record, regress
+    def __init__(self, record: Record, estimate: EstimateSliding = estimate_sliding) -> None:
+        self.record, self.estimate = record, estimate
 
     @cached_property
     def columns(self) -> dict[str, Column]:
@@ -231,14 +231,14 @@ class View:
         return encoder_step(self.values("position")) if self.has("position") else 0.0
 
     @cached_property
-    def sliding(self) -> Regression | None:
-        """The regression on certain sliding; None where the record has none, or no position and torque of a motor."""
+    def sliding(self) -> SlidingPosterior | None:
+        """What gross sliding says; None where the record has none, or no position and torque of a motor."""
         if self.torque_channel != "motor_torque" or not self.has("position"):
             return None
         motion = "linear" if self.linear else "rotary"
         torque = self.values("motor_torque")
         try:
-            return self.regress(
+            return self.estimate(
                 [Experiment("record", self.time, self.values("position"), torque)],
                 ServoAxis(motion=motion, drive_side="load"),
             )

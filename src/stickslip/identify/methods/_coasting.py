@@ -1,7 +1,7 @@
 """Points of a sliding curve from an axis that coasts: with the torque off, friction is what decelerates its inertia.
 
 At every instant F(v) = -J dv/dt. Velocity and acceleration are seen through one smooth window inside gross sliding, in
-the weak form: nothing is differentiated but the window (`stickslip.identify.fit.smooth`).
+the weak form: nothing is differentiated but the window (`stickslip.identification.windows`).
 """
 
 from __future__ import annotations
@@ -14,22 +14,14 @@ from operator import add
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.identification.rows import sliding_rows
 from stickslip.identify.experiment import TORQUES, Experiment
-from stickslip.identify.fit.smooth import Window
-from stickslip.identify.regression.sliding_rows import (
-    WIDEST,
-    Signals,
-    TooLittleSliding,
-    narrowest_width,
-    signals_of,
-    sliding_rows,
-)
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 
-APART = 3.0
-"""Window widths from point to point: the noise of neighbours then correlates by exp(-9/4) = 0.1."""
+APART = 3
+"""Rows from point to point: half a window, beyond which the noise of neighbours hardly correlates."""
 
 
 def coasting_points(records: Sequence[Record], inertia: float) -> tuple[SlidingPoints, tuple[str, ...]]:
@@ -68,21 +60,9 @@ def coasting_points(records: Sequence[Record], inertia: float) -> tuple[SlidingP
 
 def _points_of(record: Record, inertia: float) -> SlidingPoints:
     axis = ServoAxis(motion="linear" if record.units["position"] == "m" else "rotary")
-    off = np.zeros(len(record))
-    signals = signals_of(Experiment("coasting", record.time, record["position"], off), axis)
-    window = _window_for(signals)
-    rows = sliding_rows(signals, window)
-    step = math.ceil(APART * window.width / rows.spacing)
-    _, place = np.unique(rows.stroke, return_index=True)
-    chosen = (np.arange(rows.speed.size) - place[rows.stroke]) % step == 0
-    friction = -inertia * rows.fixed[:, 0]
-    return SlidingPoints(rows.speed[chosen], friction[chosen], offset=None)
-
-
-def _window_for(signals: Signals) -> Window:
-    """Return the narrowest window that sees the acceleration apart from noise; a steady one needs the widest."""
-    try:
-        width = narrowest_width(signals)
-    except TooLittleSliding:
-        width = WIDEST * signals.time.size * signals.period
-    return Window(width, signals.period)
+    rows = sliding_rows([Experiment("coasting", record.time, record["position"], np.zeros(len(record)))], axis)
+    narrow = rows.block == 0
+    velocity, acceleration, stroke = rows.velocity[narrow], rows.acceleration[narrow], rows.stroke[narrow]
+    _, first, number = np.unique(stroke, return_index=True, return_inverse=True)
+    chosen = (np.arange(stroke.size) - first[number]) % APART == 0
+    return SlidingPoints(velocity[chosen], -inertia * acceleration[chosen], offset=None)

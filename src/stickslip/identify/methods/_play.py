@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.identify.axis.result import speed_of
 from stickslip.identify.doctor.play import dead_travel
 from stickslip.identify.doctor.view import View
 from stickslip.identify.estimate import Estimate, Identification
@@ -28,7 +27,7 @@ def with_dead_travel(
         for t in experiments
         if t.drive is not None and not t.closed_loop
         and (one := dead_travel(View(Record(
-            t.time, {"position": t.position, "motor_torque": t.torque(axis, speed_of(t))},
+            t.time, {"position": t.position, "motor_torque": t.torque(axis, t.velocity())},
             {"position": unit, "motor_torque": force},
         )))) is not None
     ]  # fmt: skip

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from stickslip.binding import NEGATIVE
-from stickslip.errors import InputError
-from stickslip.identify.axis.agreed import regressed
-from stickslip.identify.axis.given_timing import given
-from stickslip.identify.axis.identify import AUTOMATIC, identify_axis
+from stickslip.errors import InputError, UnknownName
+from stickslip.identification.axis import AUTOMATIC, identify_axis
+from stickslip.identification.memo import EstimateSliding
+from stickslip.identification.notes import against_given
 from stickslip.identify.axis.over_angle import over_angle
 from stickslip.identify.axis.plain import inverse_identification
 from stickslip.identify.axis.problem import mechanics_parameters
@@ -29,7 +29,9 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     """The whole axis; the last records judge where some are held out."""
     axis, experiments = experiments_of(records, options)
     count = len(experiments) - options.held_out
-    skew, said = given(experiments[:count], axis, options.torque_is, options.delay, options.regress)
+    skew, said = stated_delay(experiments[:count], options.torque_is, options.delay)
+    if skew is not None:
+        said += contradictions(experiments[:count], axis, skew, options.estimate)
     mapped = with_map if options.position_map else by_law
     found = mapped(axis, experiments, count, skew, options)
     return with_dead_travel(replace(found, notes=(*said, *found.notes)), experiments[:count], axis)
@@ -40,7 +42,7 @@ def with_map(
 ) -> Identification:
     """The axis and what its torque over the angle is, from the first so many experiments."""
     try:
-        over = over_angle(experiments[:count], axis, skew, options.regress)
+        over = over_angle(experiments[:count], axis, skew, options.estimate)
     except InputError as error:
         found = by_law(axis, experiments, count, skew, options)
         return replace(found, notes=(*found.notes, f"No torque over the angle is identified: {error}."))
@@ -59,14 +61,58 @@ def by_law(
         plain = inverse_dynamics(
             fitted, axis, per_direction=options.per_direction, harmonics=options.harmonics
         )
-        sliding, _ = regressed(fitted, axis, skew, regress=options.regress)
-        return inverse_identification(plain, axis, sliding, held)
+        return inverse_identification(plain, axis, held)
     return identify_axis(
         fitted, axis, options.laws or AUTOMATIC, validation=held, free=options.free, frozen=options.frozen,
         values=dict(options.values), extras=Extras(harmonics=options.harmonics, load=options.load),
         per_direction=options.per_direction, robust=options.robust, intervals=options.intervals, skew=skew,
-        regress=options.regress, progress=options.progress,
+        estimate=options.estimate, progress=options.progress,
     )  # fmt: skip
+
+
+BEHIND = {"commanded": -0.5, "actual": 0.0, "mean": 0.5}
+"""Rows by which a column lies behind the torque: a command acts half a row after its row, on average, and a mean over
+the row before acted half a row before it."""
+TAKEN = (
+    "With --delay alone the torque column counts as commanded from its row to the next (--torque-is commanded); say "
+    "what it is if it is another."
+)
+ALONE = (
+    "--torque-is alone does not say how late the torque acted (the delay of a current loop): that is found from the "
+    "record. Give --delay as well to hold both, 0 where it acted at once."
+)
+
+
+def stated_delay(
+    experiments: Sequence[Experiment], torque_is: str | None, delay: float | None
+) -> tuple[float | None, list[str]]:  # fmt: skip
+    """s by which the torque's column lies behind the torque that acted, where that is stated, and what is to be said.
+
+    What the column holds does not say how late a current loop makes it act: without the delay nothing is held.
+
+    Raises
+    ------
+    UnknownName
+        If there is no such meaning of a column.
+    """
+    if torque_is is not None and torque_is not in BEHIND:
+        raise UnknownName("torque_is", torque_is, BEHIND)
+    if delay is None:
+        return None, [] if torque_is is None else [ALONE]
+    skew = BEHIND[torque_is or "commanded"] * max(t.period for t in experiments) - delay
+    return skew, [TAKEN] if torque_is is None else []
+
+
+def contradictions(
+    experiments: Sequence[Experiment], axis: ServoAxis, skew: float, estimate: EstimateSliding
+) -> list[str]:
+    """That sliding shows another delay than the stated one, in a sentence; nothing where it does not tell."""
+    if any(t.drive is None for t in experiments):
+        return []
+    try:
+        return against_given(estimate(experiments, axis), skew)
+    except InputError:
+        return []
 
 
 def refuse_for_every_law(axis: ServoAxis, experiments: Sequence[Experiment], options: Options) -> None:

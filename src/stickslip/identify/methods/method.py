@@ -10,9 +10,9 @@ from typing import Literal
 from stickslip import plugins
 from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
+from stickslip.identification.memo import EstimateSliding
+from stickslip.identification.sliding import estimate_sliding
 from stickslip.identify.estimate import Identification, silent
-from stickslip.identify.regression.regression import regress_axis
-from stickslip.identify.regression.regressions import Regress
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.spec import Law
@@ -39,9 +39,8 @@ class Options:
         How many of the records, the last ones, are not fitted but judge the result (axis).
     torque_constant, force_constant : float or None
         N·m/A of a motor that turns, N/A of a linear one.
-    regress : callable
-        The regression on certain sliding; a `stickslip.identify.regression.regressions.Regressions` does not repeat
-        the doctor's.
+    estimate : callable
+        `stickslip.identification.sliding.estimate_sliding`, or a memo of it that does not repeat the doctor's.
     progress : callable
         Is told what begins, in a few words.
     """
@@ -70,7 +69,7 @@ class Options:
     load: bool = False
     intervals: Literal["prediction", "covariance"] = "prediction"
     robust: bool = False
-    regress: Regress = regress_axis
+    estimate: EstimateSliding = estimate_sliding
     progress: Callable[[str], None] = silent
     position_map: bool = False
     force_constant: float | None = None
@@ -97,7 +96,7 @@ OWN_FLAGS = {
     "laws": "law", "values": "set", "frozen": "freeze", "held_out": "hold-out", "position_map": "position",
 }  # fmt: skip
 """Options whose name on the command line is another than that of their field."""
-OF_EVERY_METHOD = ("torque_constant", "force_constant", "regress", "progress")
+OF_EVERY_METHOD = ("torque_constant", "force_constant", "estimate", "progress")
 """Fields that no method refuses: how a log is read, and how it is computed."""
 AXIS = frozenset({"pendulum", "drive_gain", "resistance", "loop", "loop_output", "extra_torque"})
 """Options that turn a record into an experiment of an axis."""

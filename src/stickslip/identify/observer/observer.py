@@ -97,12 +97,15 @@ class Prepared:
     edge: int
     known: dict[Any, Array] = field(default_factory=dict[Any, Array], init=False, repr=False)
 
-    def correction(self, mechanics: Mechanics, parameters: Any) -> Array:
-        """Torque that the model lacks, N·m, in the band, shape (m,); of the last few values it is remembered."""
+    def correction(self, mechanics: Mechanics, parameters: Any, late: float = 0.0) -> Array:
+        """Torque that the model lacks, N·m, in the band, shape (m,); of the last few values it is remembered.
+
+        `late` are the seconds by which the torque acted before its row, half a row of a held command not counted.
+        """
         # A search stands where the one before ended, and another filter behind it asks for the same.
-        values = mechanics, *self.course.law.pack(parameters)
+        values = mechanics, late, *self.course.law.pack(parameters)
         if (found := self.known.get(values)) is None:
-            found = self.simulated(mechanics, parameters)
+            found = self.shifted(late, mechanics).simulated(mechanics, parameters)
             found.setflags(write=False)
             while len(self.known) >= REMEMBERED:
                 self.known.pop(next(iter(self.known)), None)
@@ -120,6 +123,15 @@ class Prepared:
         """Torque that the observer adds at every sample, N·m, shape (n,)."""
         found = self.segments.corrections(mechanics, parameters)
         return self.course.run(mechanics, parameters)[:, 3] if found is None else found
+
+    def shifted(self, late: float, mechanics: Mechanics) -> Prepared:
+        """The same with the drive's signal so many seconds earlier."""
+        if late == 0.0:
+            return self
+        drive = self.course.drive
+        moved = np.interp(drive.time + late, drive.time, drive.signal) - drive.signal
+        before = 0.0 if drive.disturbance is None else drive.disturbance
+        return self.perturbed(before + mechanics.drive_gain * moved)
 
     def perturbed(self, torque: Array) -> Prepared:
         """The same with this torque on the axis, N·m, shape (n,)."""

@@ -1,0 +1,40 @@
+"""Every reason why a number of the plain model could be wrong, one file each: a new doubt is a new file here.
+
+A file has ``ALTERNATIVES``, a tuple of `stickslip.identification.alternatives.alternative.Alternative`.
+"""
+
+from __future__ import annotations
+
+from stickslip.identification.alternatives import (
+    bands,
+    braking_load,
+    curve,
+    direction,
+    drift,
+    elasticity,
+    play,
+    position,
+    presliding_distance,
+    timing,
+)
+from stickslip.identification.alternatives.alternative import Alternative
+from stickslip.identification.rows import SlidingRows
+
+FILES = (
+    timing,
+    elasticity,
+    play,
+    bands,
+    braking_load,
+    direction,
+    curve,
+    presliding_distance,
+    position,
+    drift,
+)
+
+
+def usual_alternatives(rows: SlidingRows) -> tuple[Alternative, ...]:
+    """All but those that take a model or a search to be written down."""
+    between = (drift.BETWEEN_RECORDS,) if len(rows.records) > 1 else ()
+    return tuple(a for file in FILES for a in file.ALTERNATIVES) + between

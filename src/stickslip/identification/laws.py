@@ -1,0 +1,233 @@
+"""Which law an axis has: every law is fitted to one part of the records, and judged by what it lacks on the rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identification.slow_motion import Evidence, held_elsewhere, search_law, start_beside
+from stickslip.identify.axis.search import Asked, errors_of, fitted_axis
+from stickslip.identify.axis.starts import motion_of, watched
+from stickslip.identify.estimate import silent
+from stickslip.identify.experiment import Experiment
+from stickslip.identify.fit.axis_start import feasible
+from stickslip.identify.fit.parallel import mapped
+from stickslip.identify.fit.parameter_vector import Vector
+from stickslip.identify.observer.innovations import BAND, DELAY, FIRST, Criterion, robust_std
+from stickslip.identify.observer.observer import Motion, Prepared, prepare
+from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
+from stickslip.spec import Law
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+BLOCKS = 20
+"""Stretches of what is held out, whose scores differ by chance."""
+HELD_OUT = 0.3
+"""Last part of every record that is held out where no validation record is given."""
+COMPARABLE = 1e-2
+"""Relative decrease of the sum of squares at which the output errors that are compared end: laws differ by more."""
+SEARCH = 30
+"""Simulations of a search for the comparison."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One law in the comparison.
+
+    Attributes
+    ----------
+    law : str
+    parameters : int
+        Free ones.
+    held_out : mapping of str to float
+        Errors on data that were not fitted.
+    score : array
+        Mean squared misfit of each block of held-out data, over weights common to all laws.
+    start : mapping
+        The values fitted: where the fit to all data starts.
+    failure : str
+        Why it could not be fitted; empty otherwise.
+    """
+
+    law: str
+    parameters: int
+    held_out: Mapping[str, float]
+    score: Array
+    start: Mapping[str, Any]
+    failure: str = ""
+
+
+def hold_out(
+    experiments: Sequence[Experiment], validation: Sequence[Experiment]
+) -> tuple[list[Experiment], list[Experiment]]:
+    """What laws are fitted to, and what they are compared on."""
+    if validation:
+        return list(experiments), list(validation)
+    pairs = [t.split(HELD_OUT) for t in experiments]
+    return [a for a, _ in pairs], [b for _, b in pairs]
+
+
+def compare_laws(
+    evidence: Evidence, held: Sequence[Experiment], laws: Sequence[Law], asked: Asked,
+    progress: Callable[[str], None] = silent,
+) -> list[Candidate]:  # fmt: skip
+    """Fit every law to slow motion and look at the torque that it lacks on the held-out data.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        Its experiments are fitted.
+    held : sequence of Experiment
+        Only the rows that count are judged.
+    laws : sequence of Law
+    asked : Asked
+    progress : callable
+        Is told which law begins.
+
+    Raises
+    ------
+    InputError
+        If a record has no drive signal, too little is held out, or no law could be fitted.
+    """
+    followed = watched(evidence.experiments, evidence.axis, asked)
+
+    def search(law: Law) -> tuple[Criterion, Array] | str:
+        progress(f"{law.name}: law {laws.index(law) + 1} of {len(laws)}")
+        try:
+            return search_law(evidence, law, asked_of(law, asked, laws), followed, SEARCH)
+        except InputError as error:
+            return str(error)
+
+    searches = dict(zip((law.name for law in laws), mapped(search, laws), strict=True))
+    found = {name: result for name, result in searches.items() if not isinstance(result, str)}
+    failures = {name: result for name, result in searches.items() if isinstance(result, str)}
+    if not found:
+        raise InputError("; ".join(failures.values()))
+    # Weighted for all as by the law that lacks least where it was fitted.
+    criterion, u = min(found.values(), key=lambda f: robust_std(replace(f[0], whitening=FIRST).white(f[1])))
+    weights = criterion.adapted(u)
+    seen, level = [motion_of(t) for t in held], abs(start_beside(evidence).coulomb)
+
+    def judge(law: Law) -> Candidate:
+        if law.name not in found:
+            return failed(law, failures[law.name])
+        return judged(law, *found[law.name], weights, held, seen, level)
+
+    return mapped(judge, laws)
+
+
+def judged(
+    law: Law, criterion: Criterion, u: Array, weights: Criterion, held: Sequence[Experiment], motions: Sequence[Motion],
+    friction: float,
+) -> Candidate:  # fmt: skip
+    """What one law, fitted, lacks on the held-out data, with the weights common to all."""
+    inertia = criterion.vector.named(u)["inertia"]
+    # What is held out acts when it acted already.
+    vector = held_elsewhere(criterion.vector, DELAY, -0.5 * held[0].period)
+    own = replace(weights, law=law, vector=vector, mechanics=criterion.mechanics, prior=None)
+    squares = np.concatenate([
+        lacking(own, prepare(m, law, inertia, friction, min(BAND, 0.1 / t.period)), u, t)
+        for t, m in zip(held, motions, strict=True)
+    ])  # fmt: skip
+    if squares.size < BLOCKS:
+        raise InputError("the part held out is too short to judge laws on")
+    score = np.array([float(np.mean(part)) for part in np.array_split(squares, BLOCKS)])
+    parameters = feasible(law, criterion.vector.law_parameters(u))
+    assert parameters is not None
+    start = values_of(criterion.vector, u, Model(law, **parameters._asdict()))
+    return Candidate(law.name, criterion.vector.size, {}, score, start)
+
+
+def failed(law: Law, why: str) -> Candidate:
+    """A law that could not be fitted."""
+    return Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), {}, why)
+
+
+def lacking(criterion: Criterion, record: Prepared, u: Array, experiment: Experiment) -> Array:
+    """Squares of the corrections of one experiment in scales, outliers weighed, in the rows that count."""
+    time = record.course.drive.time[record.edge : -record.edge : record.stride]
+    counts = np.interp(
+        time[criterion.whitening.size - 1 :], experiment.time, experiment.rows.astype(np.float64)
+    )
+    return replace(criterion, records=[record]).residuals(u)[counts > 0.5] ** 2
+
+
+def compare_by_output(
+    fitted: Sequence[Experiment], held: Sequence[Experiment], axis: ServoAxis, laws: Sequence[Law],
+    inverse: InverseDynamics | None, asked: Asked, progress: Callable[[str], None] = silent,
+) -> list[Candidate]:  # fmt: skip
+    """The same by the output error of the simulation, for records without the drive's signal."""
+    out: list[Candidate] = []
+    weights: Mapping[str, float] | None = None
+    for number, law in enumerate(laws, 1):
+        progress(f"{law.name}: law {number} of {len(laws)}")
+        try:
+            result = fitted_axis(fitted, axis, law, inverse, asked_of(law, asked, laws), tolerance=COMPARABLE)
+        except InputError as error:
+            out.append(failed(law, str(error)))
+            continue
+        weights = weights or result.problem.weights
+        misfits = result.misfits(held)
+        size = np.array([weights[s] for s in result.problem.signals])
+        squares = np.concatenate([np.sum((m / size) ** 2, axis=1) for m in misfits])
+        score = np.array([float(np.mean(part)) for part in np.array_split(squares, BLOCKS)])
+        errors = errors_of(held, result.problem.signals, misfits)
+        start = values_of(result.problem.vector, result.u, result.model)
+        out.append(Candidate(law.name, result.problem.vector.size, errors, score, start))
+    if all(c.failure for c in out):
+        raise InputError("; ".join(c.failure for c in out))
+    return out
+
+
+def asked_of(law: Law, asked: Asked, laws: Sequence[Law]) -> Asked:
+    """What is asked without what belongs to another of the laws only: to name that is no mistake."""
+    own = {f.name for f in law.fields}
+    others = {f.name for x in laws for f in x.fields} - own
+
+    def meant(name: str) -> bool:
+        return name.partition("[")[0] not in others
+
+    values = {k: v for k, v in asked.values.items() if meant(k)}
+    return replace(
+        asked, free=[*filter(meant, asked.free)], frozen=[*filter(meant, asked.frozen)], values=values
+    )
+
+
+def values_of(vector: Vector, u: Array, model: Model) -> dict[str, Any]:
+    """The law's values of a fit, those of elements as lists."""
+    law = model.as_dict()
+    return {f.name: law[f.name] for f in model.law.fields}
+
+
+def choose(candidates: Sequence[Candidate]) -> int:
+    """Place of the law with the fewest parameters within a standard error of the best (Hastie et al. 2009, 7.10)."""
+    means = [float(np.mean(c.score)) for c in candidates]
+    best = int(np.nanargmin(means))
+    near = [best]
+    for i, c in enumerate(candidates):
+        if i == best or c.failure or not np.all(np.isfinite(c.score)):
+            continue
+        difference = c.score - candidates[best].score
+        error = float(np.std(difference, ddof=1)) / math.sqrt(difference.size)
+        if float(np.mean(difference)) <= error:
+            near.append(i)
+    return min(near, key=lambda i: (candidates[i].parameters, means[i]))
+
+
+def note_on(candidates: Sequence[Candidate], chosen: str) -> str:
+    """What the comparison showed, in a sentence."""
+    parts = [
+        f"{c.law} {'failed' if c.failure else f'{math.sqrt(float(np.mean(c.score))):.3g}'}"
+        for c in candidates
+    ]
+    return (
+        f"Law {chosen!r} is the simplest within one standard error of the best on held-out data (misfit in standard "
+        f"deviations: {', '.join(parts)})."
+    )

@@ -1,0 +1,110 @@
+"""What gross sliding shows besides numbers, in sentences: timing, drift, torque over position, alternatives."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from stickslip.identification.sliding import PRESENT, SlidingPosterior
+
+KNOWN_DELAY = 0.25
+"""Rows: half-width of a delay up to which it is worth a sentence."""
+SAME_DELAY = 0.1
+"""Rows by which a delay may be off one of a kind."""
+KINDS = (
+    (0.5, "a command held from row to row"),
+    (0.0, "a value sampled at the row"),
+    (-0.5, "a mean over the row before"),
+)
+ALLOWED = ("elasticity", "elasticity of higher order", "play", "inertia by frequency", "no single inertia")
+CONTRADICTED = "The record contradicts the timing given (--torque-is, --delay)"
+"""How the sentence begins that says so."""
+
+
+class Drift(NamedTuple):
+    """Growth of friction at the usual speed over a record, as a part of its value at the first row, with its ends."""
+
+    share: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        way, ends = (
+            ("falls", (-self.high, -self.low)) if self.share < 0.0 else ("rises", (self.low, self.high))
+        )
+        return f"{way} by {100.0 * abs(self.share):.2g} % (95 % interval {100.0 * ends[0]:.2g} to {100.0 * ends[1]:.2g} %)"
+
+
+def drift_of(found: SlidingPosterior) -> Drift | None:
+    """The drift of friction over a record; None where its interval contains 0."""
+    drift, level = found.numbers["drift"], found.friction
+    if drift.lower <= 0.0 <= drift.upper or level <= 0.0:
+        return None
+
+    def share(grown: float) -> float:
+        first = level - 0.5 * grown
+        return grown / first if first > 0.0 else math.inf
+
+    return Drift(share(drift.value), share(drift.lower), share(drift.upper))
+
+
+def on_timing(found: SlidingPosterior) -> list[str]:
+    """When the torque acted, in a sentence; nothing where the record does not determine it."""
+    skew, row = found.numbers["skew"], found.period
+    if skew.half > KNOWN_DELAY * row or found.numbers["inertia"].lower <= 0.0:
+        return []
+    share, unsure = -skew.value / row, max(SAME_DELAY, skew.half / row)
+    kind = next((words for at, words in KINDS if abs(share - at) <= unsure), "a hold and a delay together")
+    where = "after" if skew.value < 0.0 else "before"
+    return [
+        f"The torque acted {1e3 * abs(skew.value):.3g} ms (±{1e3 * skew.half:.2g}) {where} its row on average, "
+        f"{abs(share):.2g} of a row: {kind}. This is allowed for."
+    ]
+
+
+def on_drift(found: SlidingPosterior) -> list[str]:
+    """That friction drifts over the record, in a sentence; nothing where it does not."""
+    drift = drift_of(found)
+    if drift is None:
+        return []
+    return [
+        f"Friction {drift} from the first row to the last. This is allowed for; values are those of the middle."
+    ]
+
+
+def on_alternatives(found: SlidingPosterior) -> list[str]:
+    """What else than a rigid axis with friction the record shows, in a sentence each."""
+    shown = [(a, found.presence(n)) for n, a in found.alternatives.items() if found.presence(n) > PRESENT]
+    shown = [
+        (a, p) for a, p in shown if a.cause and a.name not in ("late torque", "drift") and not a.wave_number
+    ]
+    if not shown:
+        return []
+    parts = [f"{a.cause} ({100.0 * p:.0f} %)" for a, p in sorted(shown, key=lambda x: -x[1])]
+    return [
+        f"Beside a rigid axis with friction the record shows: {'; '.join(parts)}. Intervals allow for it."
+    ]
+
+
+def reason_for(found: SlidingPosterior, number: str) -> str:
+    """Which alternative widens a number most and what excludes it, for a verdict; "" where none has a third of it."""
+    name, share = found.explains(number)
+    if share < 1.0 / 3.0:
+        return ""
+    a = found.alternatives[name]
+    return f"{a.cause} explains {100.0 * share:.0f} % of the variance: {a.remedy}"
+
+
+def against_given(found: SlidingPosterior, given: float) -> list[str]:
+    """That the record shows another delay, s, than the given one; nothing where it does not."""
+    skew = found.numbers["skew"]
+    if skew.lower <= given <= skew.upper or found.numbers["inertia"].lower <= 0.0:
+        return []
+    return [
+        f"{CONTRADICTED}: the torque acted {_when(skew.value)} (±{1e3 * skew.half:.2g} ms) its row on average, not "
+        f"{_when(given)} it. Leave both options out, or correct them."
+    ]
+
+
+def _when(skew: float) -> str:
+    return f"{1e3 * abs(skew):.3g} ms {'after' if skew < 0.0 else 'before'}"

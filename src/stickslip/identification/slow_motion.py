@@ -1,0 +1,477 @@
+"""What reversals, break-away and slow motion say of a law: its simulation, held to the measured motion.
+
+The simulated axis is driven by the recorded torque and follows the measured motion through an observer
+(`stickslip.identify.observer.observer`); the torque that this takes is the misfit, whitened by an autoregression,
+outliers weighed by Student's distribution (prediction-error method: Ljung 1999, chapters 7 and 9). The torque's delay
+is inside: the simulated axis gets the torque when it acted.
+
+Inertia, constant torque, gravity and delay are those of gross sliding, which assumes less, and nothing feeds back to
+them (a cut posterior: Plummer 2015). The law's steady friction at the speeds of sliding is known from there too, as a
+prior. Where the simulation contradicts it, the difference is the simulation's: its variance grows by that (DerSimonian
+and Laird 1986, of the estimator that assumes more).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import operator
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from stickslip.errors import InputError
+from stickslip.identification.sliding import QUANTILE, SlidingPosterior, quantiles
+from stickslip.identify.axis.gravity import hanging
+from stickslip.identify.axis.problem import mechanics_of
+from stickslip.identify.axis.search import Asked, laid_out
+from stickslip.identify.axis.starts import Watched, starting_points, watched
+from stickslip.identify.estimate import Estimate
+from stickslip.identify.experiment import Experiment
+from stickslip.identify.fit.axis_start import feasible
+from stickslip.identify.fit.jackknife import leave_blocks_out
+from stickslip.identify.fit.noise import Noise
+from stickslip.identify.fit.parallel import mapped
+from stickslip.identify.fit.parameter_vector import Parameter, Vector
+from stickslip.identify.fit.sample_rate_limit import unseen_refused
+from stickslip.identify.fit.student import student_quantile
+from stickslip.identify.fit.uncertainty import verdict_on
+from stickslip.identify.observer.innovations import (
+    BLOCK,
+    DELAY,
+    Criterion,
+    Prior,
+    perturbed_steps,
+    ridge_of,
+    weighted,
+)
+from stickslip.identify.observer.observer import EXACT, ROUGH, prepare
+from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
+from stickslip.simulation.prescribed.steady import Steady
+from stickslip.spec import Law, Par
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+STARTS, FIRST_STEPS, STEPS = 4, 30, 60
+"""Starts that are followed, simulations that each may take at first, and those of a later descent."""
+SETTLED = 1e-3
+"""Relative decrease of the sum of squares at which a search ends."""
+TOLERANCE = 1e-4
+"""The same of the last descent."""
+LONGEST_STEP = 1.0
+"""Coordinates (factors of e) by which the data's own minimum may lie beside the one with the prior."""
+UNMODELLED = 3.0
+"""Factor on the simulation's standard deviations, for what no part of it describes (torque between rows, ringing, the
+observer): chosen by coverage on 51 simulated logs (`benchmarks/ordinary_logs.py`, seeds 8200000, every 13th cell)."""
+DELAY_PRIOR = 0.6
+"""Rows, as of sliding: where no sliding tells the delay."""
+ALIKE = 1e-3
+"""Part of friction to which two speeds' torques are told apart."""
+MECHANICS = ("inertia", "offset", "gravity", "gravity_angle")
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What is known of the records before a law is simulated.
+
+    Attributes
+    ----------
+    experiments : sequence of Experiment
+        Without the torque over position and time that sliding found.
+    axis : ServoAxis
+    start : InverseDynamics
+        Plain least squares: where searches start.
+    sliding : SlidingPosterior or None
+    """
+
+    experiments: Sequence[Experiment]
+    axis: ServoAxis
+    start: InverseDynamics
+    sliding: SlidingPosterior | None
+
+
+@dataclass(frozen=True, eq=False)
+class LawFit:
+    """A law fitted to slow motion beside what sliding says.
+
+    Attributes
+    ----------
+    vector : Vector
+        Its free parameters are the law's; the axis's own too where no sliding tells them.
+    u : array, shape (p,)
+    covariance : array, shape (p, p)
+        Of the coordinates.
+    model : Model
+    estimates : tuple of Estimate
+        Of the free parameters but the delay.
+    contradiction : float
+        RMS deviation, in standard deviations, of what the simulation alone says of the steady friction from sliding.
+    corrections : tuple of array
+        Torque that the model lacks, N·m (N), in the observer's band.
+    """
+
+    vector: Vector
+    u: Array
+    covariance: Array
+    model: Model
+    estimates: tuple[Estimate, ...]
+    contradiction: float
+    corrections: tuple[Array, ...]
+
+    @property
+    def correlation(self) -> Array:
+        """Of the estimates, shape (n, n)."""
+        kept = [i for i, n in enumerate(self.vector.names) if n != DELAY]
+        change = self.vector.jacobian(self.u)[kept]
+        return correlation_of(change @ self.covariance @ change.T)
+
+
+def correlation_of(covariance: Array) -> Array:
+    """Correlation of a covariance; not a number where a variance is 0."""
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(covariance / np.outer(std, std))
+
+
+# ---- the search -----------------------------------------------------------------------------------------------------
+
+
+def known_mechanics(sliding: SlidingPosterior) -> dict[str, float]:
+    """Inertia, constant torque, gravity and delay as sliding has them."""
+    value = {n: x.value for n, x in sliding.numbers.items()}
+    known = {n: value[n] for n in ("inertia", "offset", DELAY)}
+    known["inertia"] = max(known["inertia"], 1e-3 * sliding.fits[0].level.inertia)
+    if "gravity_sin" in value:
+        size, angle = hanging(value["gravity_sin"], value["gravity_cos"], sliding.rows.position)
+        known |= {"gravity": size, "gravity_angle": angle}
+    return known
+
+
+def curve_seen(law: Law, speeds: Array) -> Any:
+    """Function of named numbers and a law's parameters: torque of steady motion forward and backward at some speeds."""
+    velocity = np.concatenate([speeds, -speeds])
+    steady = Steady(law, velocity, np.sign(velocity))
+
+    def seen(named: Mapping[str, float], parameters: Any) -> Array:
+        return np.asarray(steady.torque(np.array(law.pack(parameters))) + named["offset"])
+
+    return seen
+
+
+def curve_places(sliding: SlidingPosterior) -> list[int]:
+    """Where the torques of steady motion stand among the numbers of sliding."""
+    return [k for k, n in enumerate(sliding.names) if n.startswith(("forward[", "backward["))]
+
+
+def curve_prior(law: Law, sliding: SlidingPosterior | None) -> Prior | None:
+    """What sliding says of a law's steady friction; None for a law that has none."""
+    if sliding is None or law.steady is None:
+        return None
+    mean, covariance = moments(sliding, curve_places(sliding))
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    return Prior(mean, root, curve_seen(law, sliding.speeds))
+
+
+def moments(sliding: SlidingPosterior, places: Sequence[int]) -> tuple[Array, Array]:
+    """Mean and covariance of some numbers of the mixture, as wide as its intervals."""
+    w = sliding.weights
+    means = np.array([m.mean[places] for m in sliding.members])
+    mean = w @ means
+    inner = np.einsum(
+        "m,mij->ij", w, np.array([m.covariance[np.ix_(places, places)] for m in sliding.members])
+    )
+    apart = means - mean
+    covariance = (sliding.width / QUANTILE) ** 2 * inner + (apart * w[:, None]).T @ apart
+    return mean, covariance + (ALIKE * sliding.friction) ** 2 * np.eye(len(places))
+
+
+def laid_out_with_delay(
+    evidence: Evidence, law: Law, first: InverseDynamics, model: Model, asked: Asked
+) -> Vector:
+    """The vector of what is fitted: the axis's own numbers are held where sliding tells them, the delay is one more."""
+    sliding, period = evidence.sliding, max(t.period for t in evidence.experiments)
+    late = 0.0
+    if sliding is not None:
+        known = known_mechanics(sliding)
+        late = known.pop(DELAY)
+        given = {n: x for n, x in known.items() if n not in asked.frozen}
+        asked = replace(asked, values={**asked.values, **given}, frozen=(*asked.frozen, *given))
+    vector, _ = laid_out(evidence.experiments, evidence.axis, law, first, model, asked)
+    own = {f.name for f in law.fields}
+    beside = [p for p in vector.parameters if p.name.partition("[")[0] not in own]
+    held = [p.name for p in vector.parameters if not p.free]
+    delay = Parameter(DELAY, Par("s", "t_s", "delay of the torque's column"), late, scale=period)
+    return type(vector)(
+        vector.base, frozen=[*held, *([DELAY] if sliding is not None else [])], extra=[*beside, delay]
+    )
+
+
+def search_law(
+    evidence: Evidence, law: Law, asked: Asked, seen: Watched, steps: int = STEPS
+) -> tuple[Criterion, Array]:  # fmt: skip
+    """The best minimum from several starts, weights adapted once; its criterion and coordinates.
+
+    Raises
+    ------
+    InputError
+        If no simulation from a start succeeds.
+    """
+    first = start_beside(evidence)
+    prior, level = curve_prior(law, evidence.sliding), abs(first.coulomb)
+    period = max(t.period for t in evidence.experiments)
+    if evidence.sliding is None:
+        prior = Prior(
+            np.zeros(1), np.eye(1) / (DELAY_PRIOR * period), lambda named, _: np.array([named[DELAY]])
+        )
+    mechanics = functools.partial(mechanics_of, harmonic_period=asked.extras.harmonic_period)
+    criteria = list[Criterion]()
+    records: Any = None
+    for model in starting_points(evidence.experiments, evidence.axis, law, first, asked.values):
+        vector = laid_out_with_delay(evidence, law, first, model, asked)
+        inertia = vector.named(vector.start)["inertia"]
+        # All start from one inertia.
+        records = records or [
+            prepare(m, law, inertia, level, seen.band, rounding=ROUGH) for m in seen.motions
+        ]
+        criteria.append(Criterion.first(records, law, vector, mechanics))
+    plain = mapped(lambda c: float(np.median(np.abs(c.white(c.vector.start)))), criteria)
+    rough = 1.4826 * min((x for x in plain if math.isfinite(x)), default=math.inf)
+    criteria = [replace(c, prior=prior, rough=rough) for c in criteria]
+    costs = mapped(lambda c: c.cost(c.vector.start), criteria)
+    ranked = [c for _, c in sorted(zip(costs, criteria, strict=True), key=lambda x: x[0]) if math.isfinite(_)]
+    if not ranked:
+        raise InputError(
+            f"{law.name}: no simulation from the starting values succeeds; give others with --set NAME=VALUE (values)"
+        )
+    running = mapped(lambda c: (c, c.search(c.vector.start)), ranked[:STARTS])
+    mapped(operator.methodcaller("run", min(steps, FIRST_STEPS), SETTLED), [s for _, s in running])
+    criterion, search = min(running, key=lambda x: x[1].cost)
+    criterion = criterion.adapted(search.u)
+    search = criterion.search(search.u)
+    search.run(steps, SETTLED)
+    return criterion, search.u
+
+
+def start_beside(evidence: Evidence) -> InverseDynamics:
+    """Plain least squares with the numbers of sliding in place of their own."""
+    start, sliding = evidence.start, evidence.sliding
+    if sliding is None or not start.has("fc"):
+        return start
+    named = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}
+    values = start.values.copy()
+    for own, plain in named.items():
+        values[start.names.index(plain)] = sliding.numbers[own].value
+    return replace(start, values=values)
+
+
+# ---- the fit ----------------------------------------------------------------------------------------------------------
+
+
+def fit_law(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any] | None = None) -> LawFit:
+    """Fit a law to slow motion, beside what sliding says.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    law : Law
+    asked : Asked
+        What the user holds, frees and gives.
+    start : mapping, optional
+        Values of the law at which the search begins; several starts are tried where None.
+
+    Raises
+    ------
+    InputError
+        If a record has no drive signal, the axis has backlash, or no simulation succeeds.
+    """
+    seen = watched(evidence.experiments, evidence.axis, asked)
+    criterion, u = search_law(evidence, law, replace(asked, values={**asked.values, **(start or {})}), seen)
+    inertia = criterion.vector.named(u)["inertia"]
+    level = abs(start_beside(evidence).coulomb)
+    exact = [prepare(m, law, inertia, level, seen.band, 1.0, math.inf, EXACT) for m in seen.motions]
+    criterion = replace(criterion, records=exact).adapted(u)
+    search = criterion.search(u)
+    search.run(STEPS, SETTLED)
+    optimum = criterion.descend(search.u, 12, TOLERANCE)
+    alone, covariance = from_data(criterion, optimum, evidence)
+    combined = combine(criterion, optimum.u, alone, covariance, evidence.sliding)
+    vector = criterion.vector
+    u = np.clip(combined.weights @ combined.means, vector.lower, vector.upper)
+    accepted = feasible(law, vector.law_parameters(u))
+    assert accepted is not None
+    named = vector.named(u)
+    highest = max(float(np.max(np.abs(m.seen.velocity))) for m in seen.motions)
+    estimates = estimates_of(vector, combined, u, level)
+    estimates = unseen_refused(
+        estimates, law, accepted, named["inertia"], highest, max(m.period for m in seen.motions)
+    )
+    return LawFit(
+        vector, u, combined.covariance, Model(law, **accepted._asdict()), estimates, combined.contradiction,
+        tuple(criterion.corrections(u)),
+    )  # fmt: skip
+
+
+def from_data(criterion: Criterion, optimum: Any, evidence: Evidence) -> tuple[Array, Array]:
+    """What the simulation says without the prior: its minimum (a Newton step from the one with it) and covariance.
+
+    The covariance is that of leaving stretches of time out or of the corrections given back as noise, whichever is
+    larger, and of what sliding leaves open of the axis's own numbers.
+    """
+    u, free = optimum.u, replace(criterion, prior=None)
+    known = 0 if criterion.prior is None else criterion.prior.mean.size
+    own = replace(
+        optimum, residuals=optimum.residuals[: optimum.residuals.size - known],
+        jacobian=optimum.jacobian[: optimum.jacobian.shape[0] - known],
+    )  # fmt: skip
+    r, jacobian = weighted(free, own)
+    ridge = ridge_of(r, u.size)
+    information = jacobian.T @ jacobian + ridge
+    step = np.clip(-np.linalg.solve(information, jacobian.T @ r), -LONGEST_STEP, LONGEST_STEP)
+    blocks = free.blocks(BLOCK)
+    spread = leave_blocks_out(jacobian, r + jacobian @ step, blocks, ridge)
+    noise = perturbed_steps(free, own, np.random.default_rng(0))
+    variance = np.maximum(np.diag(spread.covariance), np.diag(noise))
+    unit = np.eye(u.size)
+    wider = [student_quantile(max(spread.freedom(e) - 1.0, 1.0)) / QUANTILE for e in unit]
+    size = UNMODELLED * np.array(wider) * np.sqrt(variance / np.diag(spread.covariance))
+    covariance = spread.covariance * np.outer(size, size)
+    if evidence.sliding is not None:
+        covariance = covariance + of_the_axis(free, u, evidence.sliding, information, jacobian)
+    return u + step, covariance
+
+
+def of_the_axis(
+    criterion: Criterion, u: Array, sliding: SlidingPosterior, information: Array, jacobian: Array
+) -> Array:
+    """Covariance that the law's coordinates have from what sliding leaves open of inertia, constant torque and delay."""
+    names = [n for n in ("inertia", "offset", DELAY) if n in sliding.names]
+    _, spread = moments(sliding, [sliding.names.index(n) for n in names])
+    base, held = criterion.weighed(u), {p.name: p.value for p in criterion.vector.parameters if not p.free}
+    columns = list[Array]()
+    for k, name in enumerate(names):
+        # Not a small difference: a contact that breaks away a sample later makes the corrections rough.
+        change = 0.3 * math.sqrt(spread[k, k])
+        if name not in held or change == 0.0:
+            columns.append(np.zeros(base.size))
+            continue
+        moved = held_elsewhere(criterion.vector, name, held[name] + change)
+        columns.append((replace(criterion, vector=moved).weighed(u) - base) / change)
+    if not np.all(np.isfinite(columns)):
+        return np.zeros((u.size, u.size))
+    told = -np.linalg.solve(information, jacobian.T @ np.column_stack(columns))
+    return np.asarray(told @ spread @ told.T)
+
+
+def held_elsewhere(vector: Vector, name: str, value: float) -> Vector:
+    """The vector with another value of a held parameter."""
+    assert vector.base is not None
+    own = {f.name for f in vector.base.law.fields}
+    beside = [
+        replace(p, value=value) if p.name == name else p
+        for p in vector.parameters
+        if p.name.partition("[")[0] not in own
+    ]
+    return type(vector)(vector.base, frozen=[p.name for p in vector.parameters if not p.free], extra=beside)
+
+
+# ---- beside sliding -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Combined:
+    """A mixture over the members of sliding, in the law's coordinates.
+
+    Attributes
+    ----------
+    weights : array, shape (m,)
+    means : array, shape (m, p)
+    inner : array, shape (m, p, p)
+    contradiction : float
+    """
+
+    weights: Array
+    means: Array
+    inner: Array
+    contradiction: float
+
+    @property
+    def covariance(self) -> Array:
+        """Of the whole mixture, shape (p, p)."""
+        apart = self.means - self.weights @ self.means
+        return np.asarray(
+            np.einsum("m,mij->ij", self.weights, self.inner) + (apart * self.weights[:, None]).T @ apart
+        )
+
+
+def combine(
+    criterion: Criterion, u: Array, alone: Array, covariance: Array, sliding: SlidingPosterior | None
+) -> Combined:
+    """The simulation's own estimate and every member of sliding, each weighted by its precision.
+
+    Parameters
+    ----------
+    criterion : Criterion
+        Whose prior sees the steady friction.
+    u : array, shape (p,)
+        About which that is linear.
+    alone, covariance : array, shape (p,), (p, p)
+        What the simulation says by itself.
+    sliding : SlidingPosterior or None
+    """
+    prior = criterion.prior
+    if prior is None or sliding is None or criterion.law.steady is None:
+        return Combined(np.ones(1), alone[None, :], covariance[None, :, :], 0.0)
+    seen = criterion.prior_seen
+    there = seen(u)
+    change = np.column_stack([(seen(u + h) - seen(u - h)) / (2.0 * h.max()) for h in 1e-4 * np.eye(u.size)])
+    own = there + change @ (alone - u)
+    mean, spread = moments(sliding, curve_places(sliding))
+    apart, both = mean - own, change @ covariance @ change.T + spread
+    beyond = np.maximum(apart**2 - np.diag(both), 0.0)
+    back = covariance @ change.T @ np.linalg.pinv(both)
+    covariance = covariance + back @ np.diag(beyond) @ back.T
+    places = curve_places(sliding)
+    wider = (sliding.width / QUANTILE) ** 2
+    jitter = (ALIKE * sliding.friction) ** 2 * np.eye(len(places))
+    logs, means, inner = list[float](), list[Array](), list[Array]()
+    for m in sliding.members:
+        whole = change @ covariance @ change.T + wider * m.covariance[np.ix_(places, places)] + jitter
+        gain = np.linalg.solve(whole, change @ covariance).T
+        left = m.mean[places] - own
+        logs.append(
+            math.log(m.weight)
+            - 0.5 * float(left @ np.linalg.solve(whole, left))
+            - 0.5 * float(np.linalg.slogdet(whole)[1])
+        )
+        means.append(alone + gain @ left)
+        inner.append(covariance - gain @ change @ covariance)
+    weights = np.exp(np.array(logs) - max(logs))
+    contradiction = math.sqrt(float(np.mean(apart**2 / np.diag(both))))
+    return Combined(weights / weights.sum(), np.array(means), np.array(inner), contradiction)
+
+
+def estimates_of(vector: Vector, found: Combined, u: Array, level: float) -> tuple[Estimate, ...]:
+    """Estimates of the free parameters but the delay, with the mixture's 95 % intervals and verdicts."""
+    scale = vector.signed_scale(level)
+    values, change = vector.values(u), vector.jacobian(u)
+    out = list[Estimate]()
+    for k, p in enumerate(vector.free):
+        if p.name == DELAY:
+            continue
+        place, value = vector.coordinate_of(p.name), float(values[k])
+        std = math.sqrt(max(float(change[k] @ found.covariance @ change[k]), 0.0))
+        if place is None:
+            low, high = value - QUANTILE * std, value + QUANTILE * std
+        else:
+            own = QUANTILE * np.sqrt(np.maximum(found.inner[:, place, place], 0.0))
+            ends = quantiles(found.means[:, place], own, found.weights)
+            low, high = (math.exp(min(x, 700.0)) if p.logarithmic else x * p.scale for x in ends)
+        low, high = max(low, p.par.lower), min(high, p.par.upper)
+        low, high = min(low, value), max(high, value)
+        why = verdict_on(p, value, low, high, Noise(1.0, "residual", math.inf), scale[p.name])
+        out.append(Estimate(p.name, p.par.unit, p.par.symbol, value, std, low, high, not why, why))
+    return tuple(out)

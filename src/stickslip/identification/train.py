@@ -1,0 +1,72 @@
+"""Motor and load behind a spring, where sliding shows that the axis is not rigid.
+
+While the motor is held the load swings at omega; the motor's acceleration a then obeys
+(1 + D²/omega²) (T - F) = J a + Jm/omega² D² a, D = d/dt. So the second derivatives of the torque and of the
+acceleration tell omega and the motor's inertia Jm. They are read in the two narrowest windows, whose difference is how
+unsure they are.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from stickslip.identification.sliding import PRESENT, SlidingPosterior
+from stickslip.identification.windows import apply_at, window_weights
+from stickslip.machines.two_inertias import TwoInertias
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+DAMPED = 0.05
+"""Half-width of the frequency at least, as a part of it: the spring's damping moves it up by as much."""
+SURE_SHARE = 0.03
+"""Half-width of the motor's part of the inertia at least."""
+MOST_FREQUENCY, MOST_SHARE = 0.25, 0.15
+"""Half-widths, of the frequency relative, up to which motor and load are told."""
+
+
+def two_inertias(found: SlidingPosterior) -> TwoInertias | None:
+    """Motor and load as the two narrowest windows tell them; None where they do not."""
+    if max(found.presence("elasticity"), found.presence("elasticity of higher order")) < PRESENT:
+        return None
+    widths = sorted({b.width for b in found.rows.blocks})[:2]
+    seen = [_seen_in(found, w) for w in widths]
+    if len(seen) < 2 or any(s is None for s in seen):
+        return None
+    (f0, s0), (f1, s1) = ((s[0], s[1]) for s in seen if s is not None)
+    frequency, share = 0.5 * (f0 + f1), 0.5 * (s0 + s1)
+    half, most = max(abs(f0 - f1), DAMPED * frequency), max(abs(s0 - s1), SURE_SHARE)
+    if not (half <= MOST_FREQUENCY * frequency and most <= MOST_SHARE and most < share < 1.0 - most):
+        return None
+    return TwoInertias(frequency, (frequency - half, frequency + half), share, (share - most, share + most))
+
+
+def _seen_in(found: SlidingPosterior, width: int) -> tuple[float, float] | None:
+    """Frequency of the load, Hz, and the motor's part of the inertia in windows of one width; None for no load."""
+    rows, fit = found.rows, found.fits[0]
+    mine = np.isin(rows.block, [i for i, b in enumerate(rows.blocks) if b.width == width])
+    bent = np.concatenate([_bent_torque(b, fit.skew) for b in rows.blocks if b.width == width])
+    columns = np.column_stack([
+        rows.acceleration[mine], rows.sign[mine], rows.velocity[mine], np.ones(int(mine.sum())), rows.jerk[mine],
+        rows.snap[mine], bent,
+    ])  # fmt: skip
+    root = np.sqrt(fit.noise.weight[mine])
+    size = np.linalg.norm(columns, axis=0)
+    if columns.shape[0] < 3 * columns.shape[1] or not np.all(size > 0.0):
+        return None
+    values = np.linalg.lstsq(columns / size * root[:, None], fit.torque[mine] * root, rcond=None)[0] / size
+    inertia, snap, torque = float(values[0]), float(values[5]), float(values[6])
+    if torque >= 0.0 or inertia <= 0.0:
+        return None
+    return 1.0 / (2.0 * math.pi * math.sqrt(-torque)), snap / (-torque * inertia)
+
+
+def _bent_torque(block: Any, skew: float) -> Array:
+    """Second derivative of the torque, N·m/s² (N/s²), shape (n,)."""
+    from stickslip.identification.rows import LATEST
+
+    weights = window_weights(block.half, block.record.period, (2,), skew)
+    padded = np.pad(block.record.drive, LATEST + 1, mode="edge")
+    return apply_at(padded, block.centres + LATEST + 1, weights)[:, 0]
