@@ -268,9 +268,7 @@ def without_alternatives(
     """The experiments, torque over position and time that sliding found taken out of their drive's signal."""
     out = list[Experiment]()
     for number, t in enumerate(experiments):
-        if number >= len(sliding.rows.records):
-            return list(experiments)
-        record = sliding.rows.records[number]
+        record = sliding.rows.sources[number]
         torque = sliding.removable_torque(number)
         gain, _ = axis.drive_gains(t.quantity)
         supply = 1.0 if t.supply is None else t.supply
@@ -306,7 +304,7 @@ def compared(
     )
 
 
-# ---- the answer -------------------------------------------------------------------------------------------------------
+# ---- the answer -----------------------------------------------------------------------------------------------------
 
 
 def assembled(

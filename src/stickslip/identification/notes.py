@@ -32,7 +32,8 @@ class Drift(NamedTuple):
         way, ends = (
             ("falls", (-self.high, -self.low)) if self.share < 0.0 else ("rises", (self.low, self.high))
         )
-        return f"{way} by {100.0 * abs(self.share):.2g} % (95 % interval {100.0 * ends[0]:.2g} to {100.0 * ends[1]:.2g} %)"
+        low, high = (100.0 * x for x in ends)
+        return f"{way} by {100.0 * abs(self.share):.2g} % (95 % interval {low:.2g} to {high:.2g} %)"
 
 
 def drift_of(found: SlidingPosterior) -> Drift | None:

@@ -97,6 +97,8 @@ class SlidingRows:
     Attributes
     ----------
     blocks : tuple of Block
+    sources : tuple of SlidingRecord
+        One for each experiment, those without rows too.
     velocity, acceleration, jerk, snap, pop : array, shape (n,)
         Windowed derivatives of the position, of order 1, 2, 3, 4 and 6.
     slopes : bool
@@ -104,6 +106,7 @@ class SlidingRows:
     """
 
     blocks: tuple[Block, ...]
+    sources: tuple[SlidingRecord, ...]
     velocity: Array
     acceleration: Array
     jerk: Array
@@ -113,7 +116,7 @@ class SlidingRows:
 
     @property
     def records(self) -> tuple[SlidingRecord, ...]:
-        """The records, in their order."""
+        """The records that have rows, in their order."""
         return tuple(dict.fromkeys(b.record for b in self.blocks))
 
     @property
@@ -224,10 +227,11 @@ def sliding_rows(experiments: Sequence[Experiment], axis: ServoAxis) -> SlidingR
         If no stroke is long enough for rows of any width.
     """
     half = max(narrowest_half(t) for t in experiments)
-    blocks, first = list[Block](), 0
+    blocks, sources, first = list[Block](), list[SlidingRecord](), 0
     for t in experiments:
         record = sliding_record(t, axis, half, first)
-        first = int(record.stroke.max()) + 1
+        sources.append(record)
+        first = max(first, int(record.stroke.max()) + 1)
         blocks += [b for k in range(WIDTHS) if (b := _block(record, k, half * 2.0**k)).centres.size >= FEWEST]
     if not blocks:
         longest = max(
@@ -242,7 +246,7 @@ def sliding_rows(experiments: Sequence[Experiment], axis: ServoAxis) -> SlidingR
     derivatives = np.concatenate([
         apply_at(b.record.position, b.centres, window_weights(b.half, b.record.period, (1, 2, 3, 4, 6))) for b in blocks
     ])  # fmt: skip
-    return SlidingRows(tuple(blocks), *derivatives.T)
+    return SlidingRows(tuple(blocks), tuple(sources), *derivatives.T)
 
 
 def _block(record: SlidingRecord, width: int, half: float) -> Block:
@@ -260,7 +264,7 @@ def sample_rows(rows: SlidingRows, record: SlidingRecord) -> SlidingRows:
     every = np.arange(record.time.size)
     still = np.zeros(every.size)
     own = SlidingRows(
-        (Samples(record, 0, 0.0, every),), record.velocity, record.acceleration, still, still, still
+        (Samples(record, 0, 0.0, every),), (record,), record.velocity, record.acceleration, still, still, still
     )  # fmt: skip
     own.__dict__.update({n: getattr(rows, n) for n in ("fastest", "middle", "range", "largest", "period")})
     return own

@@ -31,6 +31,7 @@ from stickslip.identification.posterior import (
     log_sum,
 )
 from stickslip.identification.rows import LATEST, SlidingRows
+from stickslip.identification.strokes import SlidingRecord
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -47,6 +48,9 @@ WORTH = 0.1
 """Log evidence that a change of level must gain."""
 DELAY_PRIOR = 0.6
 """Rows by which a torque column usually lies off (one standard deviation): half a row for a command held, or a mean."""
+FIRST_FALLS = (0.01, 0.03, 0.1)
+"""Parts of the highest speed over which friction falls in the first fit."""
+GRAVITY = ("gravity_sin", "gravity_cos")
 GIVEN = 0.05
 """Rows to which a stated delay is known."""
 
@@ -139,13 +143,13 @@ def settle(rows: SlidingRows, asked: Asked, skew: float, widths: Sequence[int] =
     """
     begin = asked.skew if asked.skew is not None else skew
     skew = begin
-    torque = rows.torque(skew)
-    start, residual = first_fit(rows, torque, widths)
+    torque, around = rows.torque(skew), gravity_columns(rows) if asked.pendulum else None
+    start, gravity, residual = first_fit(rows, torque, widths, around)
     size = float(np.std(torque)) or 1e-300
     pace = float(np.sqrt(np.mean(rows.acceleration**2))) or 1e-300
     level = Level(max(start[0], 1e-3 * size / pace), max(start[1], 0.02 * size), 0.0, rows.period)
     falls = falls_of(rows, rows.fastest * np.geomspace(SLOWEST_FALL, FASTEST_FALL, COARSE), asked.exponents)
-    alternatives = [*usual_alternatives(rows), *registry_for(start[:4], (0.0, 0.0))]
+    alternatives = [*usual_alternatives(rows), *registry_for(start, gravity)]
     columns = [a.columns(rows) for a in alternatives]
     rates = [a.columns(rows.rates) if a.lags else None for a in alternatives]
     usual, numbers = len(alternatives), candidates(rows, asked.period)
@@ -173,6 +177,11 @@ def settle(rows: SlidingRows, asked: Asked, skew: float, widths: Sequence[int] =
                     rates.append(more.columns(rows.rates))
                     on = (*on, 0)
         moving = family.mean[top][2] * rows.acceleration
+        if asked.pendulum:
+            moving = (
+                moving
+                + gravity_columns(rows.rates) @ family.mean[top][[core.names.index(n) for n in GRAVITY]]
+            )
         for block, rate in zip(posterior.blocks, rates, strict=False):
             if rate is not None:
                 moving = moving + level.friction * rate @ family.mean[top][block]
@@ -231,8 +240,8 @@ def core_of(
         both = rows.see(lambda r: np.abs(r.velocity))[:, 0]
         named["uneven"] = (both, WIDE * level.friction / rows.fastest)
     if asked.pendulum:
-        for name, wave in (("gravity_sin", np.sin), ("gravity_cos", np.cos)):
-            named[name] = (rows.see(lambda r, w=wave: w(r.position + r.origin))[:, 0], WIDE * size)
+        sine, cosine = gravity_columns(rows).T
+        named |= {"gravity_sin": (sine, WIDE * size), "gravity_cos": (cosine, WIDE * size)}
     mean, std = np.zeros(len(named)), np.array([s for _, s in named.values()])
     for k, name in enumerate(named):
         if name in asked.known:
@@ -243,10 +252,33 @@ def core_of(
     return Core(tuple(named), np.column_stack([c for c, _ in named.values()]), mean, std)
 
 
-def first_fit(rows: SlidingRows, torque: Array, widths: Sequence[int]) -> tuple[Array, Array]:
-    """Inertia, fc, sigma2, offset and three falls by least absolute deviations; and what they leave, N·m (N)."""
-    falls = falls_of(rows, np.array([0.01, 0.03, 0.1]) * rows.fastest, EXPONENTS[:1]).alike
-    x = np.column_stack([rows.acceleration, rows.sign, rows.velocity, np.ones(torque.size), falls])
+def gravity_columns(rows: SlidingRows) -> Array:
+    """Sine and cosine of the position, shape (n, 2)."""
+
+    def both(record: SlidingRecord) -> Array:
+        angle = record.position + record.origin
+        return np.column_stack([np.sin(angle), np.cos(angle)])
+
+    return rows.see(both)
+
+
+def first_fit(
+    rows: SlidingRows, torque: Array, widths: Sequence[int], around: Array | None
+) -> tuple[Array, tuple[float, float], Array]:
+    """A plain model by least absolute deviations, three falls of friction beside it.
+
+    Returns
+    -------
+    array, shape (4,)
+        Inertia, fc, sigma2 and offset.
+    tuple of float
+        Sine and cosine of gravity, whose columns are `around`; 0 where there are none.
+    array, shape (n,)
+        What is left, N·m (N).
+    """
+    falls = falls_of(rows, np.array(FIRST_FALLS) * rows.fastest, EXPONENTS[:1]).alike
+    gravity = np.zeros((torque.size, 0)) if around is None else around
+    x = np.column_stack([rows.acceleration, rows.sign, rows.velocity, np.ones(torque.size), gravity, falls])
     use = np.ones(torque.size) if not widths else np.isin(rows.band + 1.0, widths) + 1e-3
     unit, theta = np.ones(torque.size), np.zeros(x.shape[1])
     for _ in range(ROUNDS):
@@ -256,7 +288,8 @@ def first_fit(rows: SlidingRows, torque: Array, widths: Sequence[int]) -> tuple[
         theta = np.linalg.solve(z.T @ z + 1e-9 * np.eye(x.shape[1]), z.T @ (torque / unit)) / norms
         left = np.abs(torque - x @ theta)
         unit = np.sqrt(left + 1e-3 * float(np.median(np.abs(torque))) + 1e-300) / use
-    return theta, torque - x @ theta
+    sine, cosine = (0.0, 0.0) if around is None else theta[4:6].tolist()
+    return theta[:4], (sine, cosine), torque - x @ theta
 
 
 def climb(posterior: Posterior, on: On, near: Array | None) -> tuple[On, dict[On, float], Family]:
@@ -274,9 +307,9 @@ def climb(posterior: Posterior, on: On, near: Array | None) -> tuple[On, dict[On
         places = places if near is None else near[places]
         each = [posterior.changes(family, int(p)) for p in places]
         # Neighbours are worth as much more than this combination as they are for the members looked at.
-        mine = log_sum(family.log_evidence[places])
+        beyond = looked[on] - log_sum(family.log_evidence[places])
         around = {
-            (*on[:k], level, *on[k + 1 :]): looked[on] - mine + log_sum(np.array([e.get((k, level), -np.inf) for e in each]))
+            (*on[:k], level, *on[k + 1 :]): beyond + log_sum(np.array([e.get((k, level), -np.inf) for e in each]))
             for k, level in each[0]
         }  # fmt: skip
         looked = {**around, **looked}

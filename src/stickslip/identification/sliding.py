@@ -106,10 +106,10 @@ class SlidingPosterior:
     Attributes
     ----------
     names : tuple of str
-        ``inertia``, ``fc``, ``sigma2``, ``offset``, ``skew`` (s by which the torque's column lies behind the torque that
-        acted), ``fs`` (the curve's end at rest), ``drift`` (growth of friction's level from the first row to the last);
-        of a pendulum ``gravity_sin``, ``gravity_cos``; by direction ``fc_positive`` and so on. Then the torque of
-        steady motion forward and backward at `speeds`, ``forward[0]``, ..., ``backward[0]``, ...
+        ``inertia``, ``fc``, ``sigma2``, ``offset``, ``skew`` (s by which the torque's column lies behind the torque
+        that acted), ``fs`` (the curve's end at rest), ``drift`` (growth of friction's level from the first row to the
+        last); of a pendulum ``gravity_sin``, ``gravity_cos``; by direction ``fc_positive`` and so on. Then the torque
+        of steady motion forward and backward at `speeds`, ``forward[0]``, ..., ``backward[0]``, ...
     members : tuple of Member
     width : float
         Standard deviations, in those of the members, on either side of 95 % of one member.
@@ -229,10 +229,10 @@ class SlidingPosterior:
         return self.rows.torque(self.numbers["skew"].value)
 
     def removable_torque(self, record: int) -> Array:
-        """Torque over position and time that likely alternatives add at every sample of a record, N·m (N), shape (n,)."""
+        """Torque that likely alternatives add over position and time at every sample of a record, N·m (N)."""
         fit = self.fits[0]
-        rows = sample_rows(self.rows, self.rows.records[record])
-        out = np.zeros(self.rows.records[record].time.size)
+        rows = sample_rows(self.rows, self.rows.sources[record])
+        out = np.zeros(self.rows.sources[record].time.size)
         for a, coefficients in zip(
             fit.alternatives, (self.effects[a.name] for a in fit.alternatives), strict=True
         ):

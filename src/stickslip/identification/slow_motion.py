@@ -70,8 +70,7 @@ observer): chosen by coverage on 51 simulated logs (`benchmarks/ordinary_logs.py
 DELAY_PRIOR = 0.6
 """Rows, as of sliding: where no sliding tells the delay."""
 ALIKE = 1e-3
-"""Part of friction to which two speeds' torques are told apart."""
-MECHANICS = ("inertia", "offset", "gravity", "gravity_angle")
+"""Part of friction by which any law's steady torque may be off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +171,13 @@ def curve_prior(law: Law, sliding: SlidingPosterior | None) -> Prior | None:
     if sliding is None or law.steady is None:
         return None
     mean, covariance = moments(sliding, curve_places(sliding))
-    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    root = np.linalg.inv(np.linalg.cholesky(covariance + form_of(sliding)))
     return Prior(mean, root, curve_seen(law, sliding.speeds))
+
+
+def form_of(sliding: SlidingPosterior) -> Array:
+    """Covariance of steady torques from a law's form, which no friction follows exactly."""
+    return (ALIKE * sliding.friction) ** 2 * np.eye(2 * sliding.speeds.size)
 
 
 def moments(sliding: SlidingPosterior, places: Sequence[int]) -> tuple[Array, Array]:
@@ -185,8 +189,7 @@ def moments(sliding: SlidingPosterior, places: Sequence[int]) -> tuple[Array, Ar
         "m,mij->ij", w, np.array([m.covariance[np.ix_(places, places)] for m in sliding.members])
     )
     apart = means - mean
-    covariance = (sliding.width / QUANTILE) ** 2 * inner + (apart * w[:, None]).T @ apart
-    return mean, covariance + (ALIKE * sliding.friction) ** 2 * np.eye(len(places))
+    return mean, (sliding.width / QUANTILE) ** 2 * inner + (apart * w[:, None]).T @ apart
 
 
 def laid_out_with_delay(
@@ -268,7 +271,7 @@ def start_beside(evidence: Evidence) -> InverseDynamics:
     return replace(start, values=values)
 
 
-# ---- the fit ----------------------------------------------------------------------------------------------------------
+# ---- the fit --------------------------------------------------------------------------------------------------------
 
 
 def fit_law(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any] | None = None) -> LawFit:
@@ -347,7 +350,7 @@ def from_data(criterion: Criterion, optimum: Any, evidence: Evidence) -> tuple[A
 def of_the_axis(
     criterion: Criterion, u: Array, sliding: SlidingPosterior, information: Array, jacobian: Array
 ) -> Array:
-    """Covariance that the law's coordinates have from what sliding leaves open of inertia, constant torque and delay."""
+    """Covariance of the law's coordinates that sliding leaves by inertia, constant torque and delay."""
     names = [n for n in ("inertia", "offset", DELAY) if n in sliding.names]
     _, spread = moments(sliding, [sliding.names.index(n) for n in names])
     base, held = criterion.weighed(u), {p.name: p.value for p in criterion.vector.parameters if not p.free}
@@ -378,7 +381,7 @@ def held_elsewhere(vector: Vector, name: str, value: float) -> Vector:
     return type(vector)(vector.base, frozen=[p.name for p in vector.parameters if not p.free], extra=beside)
 
 
-# ---- beside sliding -----------------------------------------------------------------------------------------------------
+# ---- beside sliding -------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -430,16 +433,17 @@ def combine(
     change = np.column_stack([(seen(u + h) - seen(u - h)) / (2.0 * h.max()) for h in 1e-4 * np.eye(u.size)])
     own = there + change @ (alone - u)
     mean, spread = moments(sliding, curve_places(sliding))
-    apart, both = mean - own, change @ covariance @ change.T + spread
+    apart, both = mean - own, change @ covariance @ change.T + spread + form_of(sliding)
     beyond = np.maximum(apart**2 - np.diag(both), 0.0)
     back = covariance @ change.T @ np.linalg.pinv(both)
     covariance = covariance + back @ np.diag(beyond) @ back.T
     places = curve_places(sliding)
     wider = (sliding.width / QUANTILE) ** 2
-    jitter = (ALIKE * sliding.friction) ** 2 * np.eye(len(places))
     logs, means, inner = list[float](), list[Array](), list[Array]()
     for m in sliding.members:
-        whole = change @ covariance @ change.T + wider * m.covariance[np.ix_(places, places)] + jitter
+        whole = (
+            change @ covariance @ change.T + wider * m.covariance[np.ix_(places, places)] + form_of(sliding)
+        )
         gain = np.linalg.solve(whole, change @ covariance).T
         left = m.mean[places] - own
         logs.append(

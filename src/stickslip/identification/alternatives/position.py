@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WAVES, PERIOD = 24, 1.5
 """Sines and cosines of one and a half times the range: a smooth function on the range is no periodic one."""
+SIZES, SCALES = (0.01, 0.03, 0.1), (1.0, 4.0, 16.0)
+"""Parts of Fc, and waves within the range, of a random function over the position."""
 REMEDY = "map the torque over the position (--method cogging), or record over a longer way"
 
 
@@ -43,8 +46,8 @@ ALTERNATIVES = (
     ),
     Alternative(
         "waves over position", waves, absent=(0.0005, 4.0),
-        present=tuple((size, scale) for size in (0.01, 0.03, 0.1) for scale in (1.0, 4.0, 16.0)), odds=0.2, lags=True, removable=True,
-        shape=smoothness, cause="a torque that repeats over the position", remedy=REMEDY,
+        present=tuple(itertools.product(SIZES, SCALES)), odds=0.2, lags=True, removable=True, shape=smoothness,
+        cause="a torque that repeats over the position", remedy=REMEDY,
     ),
     Alternative(
         "friction over position",

@@ -14,7 +14,6 @@ from stickslip.identify.estimate import Estimate
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TURN = 2.0 * math.pi
-NOT_ITS_SIZE = "the size of the gravity torque is not determined"
 
 
 def nearest(angle: float, position: Array) -> float:
@@ -46,13 +45,3 @@ def within_a_turn(estimates: Sequence[Estimate], position: Array) -> tuple[Estim
     return tuple(out)
 
 
-def of_one_weight(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
-    """The estimates, the angle at which a pendulum hangs not identified where its gravity is not: both are chosen
-    together then, since an angle that stays while the other moves is no pendulum that anybody has seen."""
-    told = all(e.identified for e in estimates if e.name == "gravity")
-    return tuple(
-        replace(e, identified=False, verdict=NOT_ITS_SIZE)
-        if e.name == "gravity_angle" and e.identified and not told
-        else e
-        for e in estimates
-    )
