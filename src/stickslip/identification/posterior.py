@@ -130,17 +130,6 @@ class Family:
     gain: Array
     spread: Array
 
-    def covariance(self, place: int, columns: Any) -> Array:
-        """Covariance of some coefficients of a member, shape (k, k)."""
-        w = self.gain[place][columns]
-        return self.base[np.ix_(columns, columns)] + w @ self.spread[place] @ w.T
-
-    def of_numbers(self, place: int, rows: Array, fall: Array) -> tuple[Array, Array]:
-        """Mean and covariance of linear combinations, shape (k, p) of the coefficients and (k, 2) of the fall's."""
-        mean = rows @ self.mean[place] + fall @ self.fall[place]
-        w = rows @ self.gain[place] - fall
-        return mean, rows @ self.base @ rows.T + w @ self.spread[place] @ w.T
-
 
 class Posterior:
     """All members for one linearisation, one set of weights and one list of alternatives."""
@@ -227,24 +216,40 @@ class Posterior:
             np.concatenate([np.zeros((1, 2, 2)), spread * np.outer(s, s)]),
         )  # fmt: skip
 
-    def changes(self, family: Family, place: int) -> dict[tuple[int, int], float]:
-        """Log evidence with each alternative at each other level, from a member's posterior of its coefficients."""
-        out: dict[tuple[int, int], float] = {}
+    def changes(self, family: Family, places: Any) -> dict[tuple[int, int], Array]:
+        """Log evidence of some members with each alternative at each other level, shape (members,) each.
+
+        From the members' own posteriors of its coefficients: no other is solved for.
+        """
+        out: dict[tuple[int, int], Array] = {}
         for k, (a, block) in enumerate(zip(self.alternatives, self.blocks, strict=True)):
-            mean, spread = family.mean[place][block], family.covariance(place, block)
-            now = self.stds[k][family.on[k]]
+            now, mean, gain = (
+                self.stds[k][family.on[k]],
+                family.mean[places][:, block],
+                family.gain[places][:, block],
+            )
+            spread = family.base[np.ix_(block, block)] + gain @ family.spread[places] @ gain.transpose(
+                0, 2, 1
+            )
+            # In standard deviations of the level it has: what remains of each is at most 1.
+            sizes, ways = np.linalg.eigh(spread / np.outer(now, now)) if a.shape is None else (None, None)
             for level in range(len(a.levels)):
                 if level == family.on[k]:
                     continue
                 then = self.stds[k][level]
-                change = then**-2 - now**-2
-                b = np.eye(block.size) + spread * change
-                sign, log_det = np.linalg.slogdet(b)
-                if sign <= 0.0:
-                    continue
-                gain = -0.5 * log_det - 0.5 * float((change * mean) @ np.linalg.solve(b, mean))
-                gain += float(np.sum(np.log(now / then))) + a.log_odds(level) - a.log_odds(family.on[k])
-                out[k, level] = float(family.log_evidence[place]) + gain
+                if sizes is not None and ways is not None:
+                    change = float((now[0] / then[0]) ** 2) - 1.0
+                    along = np.einsum("mij,mi->mj", ways, mean / now)
+                    grown = np.maximum(1.0 + change * sizes, 1e-12)
+                    log_det = np.sum(np.log(grown), axis=1)
+                    square = change * np.sum(along**2 / grown, axis=1)
+                else:
+                    more = then**-2 - now**-2
+                    b = np.eye(block.size) + spread * more
+                    log_det = np.linalg.slogdet(b)[1]
+                    square = np.einsum("mi,mi->m", more * mean, np.linalg.solve(b, mean[:, :, None])[:, :, 0])
+                odds = a.log_odds(level) - a.log_odds(family.on[k]) + float(np.sum(np.log(now / then)))
+                out[k, level] = family.log_evidence[places] - 0.5 * log_det - 0.5 * square + odds
         return out
 
     def predicted(self, family: Family, place: int) -> Array:

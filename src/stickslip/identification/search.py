@@ -305,13 +305,10 @@ def climb(posterior: Posterior, on: On, near: Array | None) -> tuple[On, dict[On
         top = float(np.max(evidence))
         places = np.flatnonzero(evidence > top - NEAR)
         places = places if near is None else near[places]
-        each = [posterior.changes(family, int(p)) for p in places]
+        changed = posterior.changes(family, places)
         # Neighbours are worth as much more than this combination as they are for the members looked at.
         beyond = looked[on] - log_sum(family.log_evidence[places])
-        around = {
-            (*on[:k], level, *on[k + 1 :]): beyond + log_sum(np.array([e.get((k, level), -np.inf) for e in each]))
-            for k, level in each[0]
-        }  # fmt: skip
+        around = {(*on[:k], level, *on[k + 1 :]): beyond + log_sum(e) for (k, level), e in changed.items()}
         looked = {**around, **looked}
         new = max(around, key=lambda x: around[x])
         if around[new] <= looked[on] + WORTH:

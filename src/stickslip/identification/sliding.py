@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from stickslip.identification.alternatives.alternative import Alternative
-from stickslip.identification.posterior import FALL_FORM, SPLIT, Family, Posterior, log_sum
+from stickslip.identification.mixture import NEGLIGIBLE, Member, Mixture, mix
 from stickslip.identification.rows import SlidingRows, sample_rows, sliding_rows
 from stickslip.identification.search import Asked, Fit, settle
 from stickslip.identify.experiment import Experiment, insist_on_motion
@@ -26,19 +26,13 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 STARTS: tuple[tuple[float, tuple[int, ...]], ...] = ((0.0, ()), (0.0, (2,)), (-1.0, ()))
 """Rows of skew, and widths of the first fit, from which the search starts."""
-REACH, MOST_SETS = 6.0, 40
-"""Log evidence below the best within which a combination is in the mixture; and how many of them at most."""
-FALL_REACH = 9.0
-"""The same for friction's fall."""
-NEGLIGIBLE = 1e-5
-"""Of the largest weight: members below are left out."""
 UNTHOUGHT = 1.2
 """Factor on every half-width, for what no alternative describes: the one number here that was chosen by coverage (155
 simulated logs of the prototype)."""
 QUANTILE = student_quantile(np.inf)
 """Standard deviations on either side of 95 % of a normal distribution."""
-SPEEDS = 6
-"""Speeds, from the slowest sliding to the fastest, at which the friction curve is handed on."""
+CELL = 0.6
+"""Of the step from one velocity of friction's fall that is tried to the next: standard deviation within one."""
 PRESENT = 0.5
 """Probability from which on an alternative counts as there."""
 
@@ -65,38 +59,6 @@ class Number:
     def std(self) -> float:
         """Standard deviation of a normal distribution with an interval as wide."""
         return self.half / QUANTILE
-
-
-@dataclass(frozen=True, eq=False)
-class Member:
-    """One member of the mixture.
-
-    Attributes
-    ----------
-    weight : float
-    mean, std : array, shape (k,)
-    covariance : array, shape (k, k)
-    on : mapping of str to int
-        Alternatives that are present, with their levels.
-    vs, exponent : float
-        Of friction's fall; not a number where there is none.
-    """
-
-    weight: float
-    mean: Array
-    std: Array
-    covariance: Array
-    on: Mapping[str, int]
-    vs: float
-    exponent: float
-
-
-class Functionals(NamedTuple):
-    """Numbers as combinations of coefficients: rows of shape (k, p), and (k, 2) for those of friction's fall."""
-
-    names: tuple[str, ...]
-    rows: Array
-    fall: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,168 +229,37 @@ def estimate_sliding(
     insist_on_motion(experiments)
     asked = asked or Asked(pendulum=axis.gravity == "pendulum")
     rows = sliding_rows(experiments, axis)
-    fits = [settle(rows, asked, skew * rows.period, widths) for skew, widths in starts]
-    return mixture(rows, fits, asked)
+    fits = list[Fit]()
+    for skew, widths in starts:
+        fit = settle(rows, asked, skew * rows.period, widths)
+        if any(same_place(fit, f) for f in fits):
+            break
+        fits.append(fit)
+    return posterior_of(rows, fits, mix(rows, fits, asked))
 
 
-def mixture(rows: SlidingRows, fits: Sequence[Fit], asked: Asked) -> SlidingPosterior:
-    """Every combination within reach of the best of each start, under the same weights."""
-    weight = len(fits) / np.sum([1.0 / f.noise.weight for f in fits], axis=0)
-    found = list[tuple[float, Fit, Posterior, Family, int]]()
-    for f in fits:
-        posterior = f.posterior(weight)
-        sets = sorted(
-            (x for x in f.looked if f.looked[x] > f.looked[f.on] - REACH), key=lambda x: -f.looked[x]
-        )
-        falls = np.flatnonzero(f.family.log_evidence > np.max(f.family.log_evidence) - FALL_REACH)
-        for on in sets[:MOST_SETS]:
-            family = posterior.family(on)
-            found += [(float(family.log_evidence[p]), f, posterior, family, int(p)) for p in falls]
-    evidence = np.array([x[0] for x in found])
-    share = np.exp(evidence - log_sum(evidence))
-    kept = [(float(w), x) for w, x in zip(share, found, strict=True) if w > NEGLIGIBLE * share.max()]
-    total = sum(w for w, _ in kept)
-    _, (_, head, posterior, family, place) = max(kept, key=lambda k: k[0])
-    speeds = np.geomspace(max(rows.slowest, 1e-3 * rows.fastest), rows.fastest, SPEEDS)
-    factor = inflation(rows, head, posterior, family, place, weight, asked, speeds)
-    members = tuple(_member(w / total, *x[1:], asked, factor, speeds) for w, x in kept)
-    strokes = max(float(np.unique(rows.stroke).size) - 1.0, 2.0)
-    falls = np.unique(head.falls.speed)
-    spacing = QUANTILE * 0.6 * float(np.log(falls[1] / falls[0])) if falls.size > 1 else 1.0
-    effects = {
-        a.name: family.mean[place][b] for a, b in zip(posterior.alternatives, posterior.blocks, strict=True)
-    }
-    named = functionals(posterior, asked, speeds, np.nan, np.nan).names
-    return SlidingPosterior(
-        named, members, UNTHOUGHT * student_quantile(strokes), rows,
-        (head, *(f for f in fits if f is not head)), spacing, speeds, _beside(posterior, family, place),
-        _waves(posterior, family, place), effects,
-    )  # fmt: skip
+def same_place(one: Fit, other: Fit) -> bool:
+    """Whether two starts ended with the same alternatives and, to a thousandth of a row, the same delay."""
+    return one.on == other.on and abs(one.skew - other.skew) < 1e-3 * one.level.skew
 
 
-def _beside(posterior: Posterior, family: Family, place: int) -> Array:
-    """Torque of all alternatives but those of the friction curve and of the delay, shape (n,)."""
-    out = np.zeros(posterior.matrix.shape[0])
-    for a, block in zip(posterior.alternatives, posterior.blocks, strict=True):
+def posterior_of(rows: SlidingRows, fits: Sequence[Fit], found: Mixture) -> SlidingPosterior:
+    """The mixture with what its likeliest member says of every alternative."""
+    mean, alternatives = found.family.mean[found.place], found.posterior.alternatives
+    effects = {a.name: mean[b] for a, b in zip(alternatives, found.posterior.blocks, strict=True)}
+    beside, waves = np.zeros(rows.sign.size), list[tuple[float, float]]()
+    for a, block, level in zip(alternatives, found.posterior.blocks, found.family.on, strict=True):
         if a.curve is None and a.unit != "skew":
-            out += posterior.matrix[:, block] @ family.mean[place][block]
-    return out
-
-
-def _waves(posterior: Posterior, family: Family, place: int) -> tuple[tuple[float, float], ...]:
-    """Wave numbers and amplitudes of the orders of cogging that are present."""
-    out = list[tuple[float, float]]()
-    for a, block, level in zip(posterior.alternatives, posterior.blocks, family.on, strict=True):
+            beside += found.posterior.matrix[:, block] @ mean[block]
         if a.wave_number and level:
-            out.append(
-                (a.wave_number, posterior.level.friction * float(np.hypot(*family.mean[place][block])))
-            )
-    return tuple(out)
-
-
-def functionals(posterior: Posterior, asked: Asked, speeds: Array, vs: float, exponent: float) -> Functionals:
-    """The numbers as combinations of a member's coefficients; `vs` is not a number where friction does not fall."""
-    core, level = posterior.core.names, posterior.level
-    blocks = {a.name: b for a, b in zip(posterior.alternatives, posterior.blocks, strict=True)}
-    unit = np.eye(posterior.count)
-    of = {n: unit[k].copy() for k, n in enumerate(core) if n != "uneven"}
-    of["skew"][blocks["late torque"][0]] = level.skew
-    of["fs"] = of["fc"].copy()
-    of["fs"][blocks["another curve"][-1]] = level.friction
-    drift = blocks["drift"]
-    of["drift"] = 2.0 * level.friction * (unit[drift[3]] + unit[drift[5]])
-    fall = {"fs": 1.0}
-    uneven = unit[core.index("uneven")] if asked.by_direction else np.zeros(posterior.count)
-    if asked.by_direction:
-        for way, sign in (("positive", 1.0), ("negative", -1.0)):
-            of[f"fc_{way}"] = of["fc"] + sign * of["offset"]
-            of[f"sigma2_{way}"] = of["sigma2"] + sign * uneven
-    curve = np.tile(of["fc"], (speeds.size, 1)) + speeds[:, None] * of["sigma2"]
-    for a, block in zip(posterior.alternatives, posterior.blocks, strict=True):
-        if a.curve is not None:
-            curve[:, block] += level.of(a.unit) * a.curve(speeds, posterior.rows)
-    left = np.exp(-((speeds / vs) ** exponent)) if np.isfinite(vs) else np.zeros(speeds.size)
-    for way, sign in (("forward", 1.0), ("backward", -1.0)):
-        for i, v in enumerate(speeds):
-            of[f"{way}[{i}]"] = sign * curve[i] + of["offset"] + v * uneven
-            fall[f"{way}[{i}]"] = sign * float(left[i])
-    falls = np.array([[fall.get(n, 0.0), 0.0] for n in of]) if np.isfinite(vs) else np.zeros((len(of), 2))
-    return Functionals(tuple(of), np.array(list(of.values())), falls)
-
-
-def _fall_of(posterior: Posterior, place: int) -> tuple[float, float]:
-    """Velocity and exponent of a member's fall; not numbers where there is none."""
-    falls = posterior.falls
-    return (float(falls.speed[place - 1]), float(falls.exponent[place - 1])) if place else (np.nan, np.nan)
-
-
-def _member(
-    weight: float,
-    fit: Fit,
-    posterior: Posterior,
-    family: Family,
-    place: int,
-    asked: Asked,
-    factor: Array,
-    speeds: Array,
-) -> Member:
-    vs, exponent = _fall_of(posterior, place)
-    f = functionals(posterior, asked, speeds, vs, exponent)
-    mean, covariance = family.of_numbers(place, f.rows, f.fall)
-    mean[f.names.index("skew")] += fit.skew
-    covariance = covariance * np.outer(factor, factor)
-    more = np.zeros(mean.size)
-    steady = np.array(
-        [1.0 if n.startswith("forward") else -1.0 if n.startswith("backward") else 0.0 for n in f.names]
-    )
-    for a, block in zip(posterior.alternatives, posterior.blocks, strict=True):
-        if a.splits:
-            split = SPLIT * (posterior.level.of(a.unit) * family.mean[place][block[0]]) ** 2
-            more[f.names.index(a.splits)] += split
-            if a.splits == "fc":
-                covariance = covariance + split * np.outer(steady, steady)
-    if place:
-        more[f.names.index("fs")] += (FALL_FORM * family.fall[place][0]) ** 2
-    for name in asked.known:
-        if name in f.names:
-            more[f.names.index(name)] = 0.0
-    covariance = covariance + np.diag(more)
-    on = {a.name: k for a, k in zip(posterior.alternatives, family.on, strict=True) if k}
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return Member(weight, mean, std, covariance, on, vs, exponent)
-
-
-def inflation(
-    rows: SlidingRows, fit: Fit, posterior: Posterior, family: Family, place: int, weight: Array, asked: Asked,
-    speeds: Array,
-) -> Array:  # fmt: skip
-    """By how much standard deviations from scores summed by stroke, or by state, exceed the posterior's, shape (k,)."""
-    columns, covariance = posterior.matrix, family.base
-    f = functionals(posterior, asked, speeds, *_fall_of(posterior, place))
-    combined = f.rows
-    if place:
-        columns = np.hstack([columns, posterior.fall_matrix[:, 2 * place - 2 : 2 * place]])
-        combined = np.hstack([f.rows, f.fall])
-        g, c = family.gain[place], family.spread[place]
-        covariance = np.block([[family.base + g @ c @ g.T, -g @ c], [-c @ g.T, c]])
-    residual = fit.torque - posterior.predicted(family, place)
-    own = combined @ covariance
-    plain = np.sqrt(np.maximum(np.einsum("kp,kp->k", own, combined), 1e-300))
-    score = (columns * (weight * residual)[:, None]) @ own.T
-    state = np.digitize(rows.velocity / rows.largest[0], STATE_SPEEDS) * 8
-    state = state + np.digitize(rows.acceleration / rows.largest[1], STATE_ACCELERATIONS) + 64 * rows.block
-    factor = np.ones(len(f.names))
-    for cluster in (rows.stroke, state):
-        groups = np.unique(cluster, return_inverse=True)[1]
-        count = int(groups.max()) + 1
-        sums = np.zeros((count, score.shape[1]))
-        np.add.at(sums, groups, score)
-        factor = np.fmax(factor, np.sqrt(np.sum(sums**2, axis=0) * count / max(count - 1, 1)) / plain)
-    return factor
-
-
-STATE_SPEEDS, STATE_ACCELERATIONS = np.linspace(-0.9, 0.9, 7), np.linspace(-0.7, 0.7, 7)
-"""Borders of the states whose scores are summed, in parts of the largest."""
+            waves.append((a.wave_number, found.posterior.level.friction * float(np.hypot(*mean[block]))))
+    strokes = max(float(np.unique(rows.stroke).size) - 1.0, 2.0)
+    falls = np.unique(found.head.falls.speed)
+    spacing = QUANTILE * CELL * float(np.log(falls[1] / falls[0])) if falls.size > 1 else 1.0
+    return SlidingPosterior(
+        found.names, found.members, UNTHOUGHT * student_quantile(strokes), rows,
+        (found.head, *(f for f in fits if f is not found.head)), spacing, found.speeds, beside, tuple(waves), effects,
+    )  # fmt: skip
 
 
 def quantiles(mean: Array, std: Array, weight: Array, part: float = 0.025) -> tuple[float, float]:
