@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.errors import InputError
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.force_error import plain_error_on
-from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.simulation.recorded_input.simulation import Mechanics
@@ -24,18 +25,44 @@ POSITIVE = ("inertia", "fc", "sigma2", "gravity")
 """Beginnings of the names of numbers that are greater than 0; the angle of a pendulum is none."""
 
 
+OTHER_CORNERS = (0.5, 0.7, 1.4)
+"""Times the corner of the low-pass at which the equations are solved again: what values change by, it takes from ramps
+and reversals."""
+
+
+def at_other_corners(
+    found: InverseDynamics, experiments: Sequence[Experiment], axis: ServoAxis, harmonics: int = 0
+) -> list[InverseDynamics]:
+    """The inverse dynamics with the low-pass at other corners, those that the records allow."""
+    out: list[InverseDynamics] = []
+    for times in OTHER_CORNERS:
+        try:
+            out.append(inverse_dynamics(
+                experiments, axis, per_direction=found.has("fc_plus"), cutoff=times * found.cutoff, harmonics=harmonics,
+            ))  # fmt: skip
+        except InputError:
+            continue
+    return out
+
+
 def inverse_identification(
     found: InverseDynamics,
     axis: ServoAxis,
     validation: Sequence[Experiment] = (),
+    others: Sequence[InverseDynamics] = (),
 ) -> Identification:
     """The inverse dynamics as an `Identification`, its friction as the law ``coulomb``.
 
     Per direction the law is asymmetric, unless a constant torque above the friction acts along: then it has the mean of
-    both directions, and the constant torque half of their difference. `validation` records give the held-out error.
+    both directions, and the constant torque half of their difference. Intervals hold the correlation of the residuals
+    and what the values change by with the corner of the low-pass (`others`, from `at_other_corners`), as between-fit
+    variance (DerSimonian and Laird 1986). `validation` records give the held-out error.
     """
     model, mechanics = parts_of(found)
     names, units, values, covariance = of_the_model(found, model)
+    for other in others:
+        apart = of_the_model(other, model)[2] - values
+        covariance = covariance + np.outer(apart, apart) / len(others)
     std = np.sqrt(np.diag(covariance))
     estimates: list[Estimate] = []
     for name, unit, value, spread in zip(names, units, values.tolist(), std.tolist(), strict=True):
@@ -53,7 +80,7 @@ def inverse_identification(
         "inverse dynamics", model, tuple(estimates), covariance / np.outer(std, std),
         misfit,
         (f"Position filtered at {found.cutoff:.4g} Hz, decimated to {found.band:.4g} Hz; intervals allow for the "
-         "correlation of the residuals.",),
+         "correlation of the residuals and for the choice of that corner.",),
         details={"inverse": found, "axis": axis, "mechanics": mechanics,
                  "classic_std": dict(zip(found.names, found.std.tolist()))},
     )  # fmt: skip

@@ -11,7 +11,7 @@ from stickslip.identification.axis import AUTOMATIC, identify_axis
 from stickslip.identification.memo import EstimateSliding
 from stickslip.identification.notes import against_given
 from stickslip.identify.axis.over_angle import over_angle
-from stickslip.identify.axis.plain import inverse_identification
+from stickslip.identify.axis.plain import at_other_corners, inverse_identification
 from stickslip.identify.axis.problem import mechanics_parameters
 from stickslip.identify.axis.search import LEVELS, Extras, require_known
 from stickslip.identify.estimate import Identification
@@ -61,7 +61,8 @@ def by_law(
         plain = inverse_dynamics(
             fitted, axis, per_direction=options.per_direction, harmonics=options.harmonics
         )
-        return inverse_identification(plain, axis, held)
+        others = at_other_corners(plain, fitted, axis, options.harmonics)
+        return inverse_identification(plain, axis, held, others)
     return identify_axis(
         fitted, axis, options.laws or AUTOMATIC, validation=held, free=options.free, frozen=options.frozen,
         values=dict(options.values), extras=Extras(harmonics=options.harmonics, load=options.load),
