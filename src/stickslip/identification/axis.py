@@ -28,7 +28,7 @@ from stickslip.identification.laws import (
     note_on,
 )
 from stickslip.identification.memo import EstimateSliding
-from stickslip.identification.notes import on_alternatives, on_drift, on_timing, reason_for
+from stickslip.identification.notes import cause_of, on_alternatives, on_drift, on_timing, reason_for
 from stickslip.identification.posterior import EXPONENTS
 from stickslip.identification.search import Asked as SlidingAsked
 from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
@@ -361,9 +361,11 @@ def estimate_from(p: Parameter, sliding: SlidingPosterior, name: str, scale: flo
     why = verdict_on(
         p, value, low, high, Noise(1.0, "residual", math.inf), 1.0 if p.par.unit == "rad" else scale
     )
-    if why and (reason := reason_for(sliding, name)):
-        why = f"{why}; {reason}"
-    return Estimate(p.name, p.par.unit, p.par.symbol, value, number.std, low, high, not why, why)
+    cause, share = cause_of(sliding, name) if why else ("", 0.0)
+    why += reason_for(sliding, cause, share)
+    return Estimate(
+        p.name, p.par.unit, p.par.symbol, value, number.std, low, high, not why, why, cause, share
+    )
 
 
 def gravity_estimates(
@@ -422,6 +424,7 @@ def finished(
             )
             misfit["held_out_inverse_dynamics_relative"] = plain_error_on(validation, seen.axis, start)
     untold = [e.name for e in estimates if not e.identified]
+    combined = details["slow_motion"].combinations() if "slow_motion" in details else []
     last = (
         [
             f"Not identified: {', '.join(untold)}; other values of {'it' if len(untold) == 1 else 'them'} fit as well."
@@ -431,7 +434,7 @@ def finished(
     )
     found = Identification(
         "axis", fitted.model, tuple(estimates), correlation, misfit,
-        (*notes, *loop_notes(fitted, misfit), *last),
+        (*notes, *loop_notes(fitted, misfit), *last, *combined),
         measure_next=advice(estimates, problem.law, seen.sliding),
         details={
             "mechanics": fitted.mechanics, "inverse": start, "sliding": seen.sliding, "output": fitted,
@@ -475,11 +478,8 @@ def advice(estimates: Sequence[Estimate], law: Law, sliding: SlidingPosterior | 
         out.append(
             "Record slow reversals with a finer position sensor: the pre-sliding range was hardly seen."
         )
-    remedies = dict.fromkeys(
-        sliding.alternatives[name].remedy for e in estimates
-        if not e.identified and sliding is not None and e.name in sliding.names
-        for name, share in [sliding.explains(e.name)] if share > 1.0 / 3.0
-    )  # fmt: skip
+    causes = dict.fromkeys(e.cause for e in estimates if e.cause and not e.identified)
+    remedies = [] if sliding is None else [sliding.alternatives[c].remedy for c in causes]
     out += [f"{r[0].upper()}{r[1:]}." for r in remedies]
     if "inertia" in missing:
         out.append("Record stronger accelerations.")

@@ -87,13 +87,22 @@ def on_alternatives(found: SlidingPosterior) -> list[str]:
     ]
 
 
-def reason_for(found: SlidingPosterior, number: str) -> str:
-    """Which alternative widens a number most and what excludes it, for a verdict; "" where none has a third of it."""
+MOSTLY = 1.0 / 3.0
+"""Part of a number's variance from which on an alternative is named as what widens it."""
+
+
+def cause_of(found: SlidingPosterior, number: str) -> tuple[str, float]:
+    """The alternative that widens a number most, and its part of the variance; none below a third of it."""
     name, share = found.explains(number)
-    if share < 1.0 / 3.0:
+    return (name, share) if share >= MOSTLY else ("", 0.0)
+
+
+def reason_for(found: SlidingPosterior, cause: str, share: float) -> str:
+    """Why a number is wide and what to record to exclude that, for a verdict; "" without a cause."""
+    if not cause:
         return ""
-    a = found.alternatives[name]
-    return f"{a.cause} explains {100.0 * share:.0f} % of the variance: {a.remedy}"
+    a = found.alternatives[cause]
+    return f"; {a.cause} explains {100.0 * share:.0f} % of the variance: {a.remedy}"
 
 
 def against_given(found: SlidingPosterior, given: float) -> list[str]:

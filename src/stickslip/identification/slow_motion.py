@@ -121,12 +121,39 @@ class LawFit:
     contradiction: float
     corrections: tuple[Array, ...]
 
+    def combinations(self) -> list[str]:
+        """Products of parameters that are determined although none of them is, in a sentence each."""
+        untold = {e.name for e in self.estimates if not e.identified and e.value > 0.0}
+        free = [p for p in self.vector.free if p.name in untold and p.logarithmic]
+        places = [i for p in free if (i := self.vector.coordinate_of(p.name)) is not None]
+        if len(places) < 2:
+            return []
+        sizes, ways = np.linalg.eigh(self.covariance[np.ix_(places, places)])
+        names = [
+            self.vector.free[i].name for i in range(len(self.vector.free)) if self.vector.free[i] in free
+        ]
+        out = list[str]()
+        for size, way in zip(sizes, ways.T, strict=True):
+            part = way * np.sign(way[np.argmax(np.abs(way))])
+            named = [f"{x:.2g} log {n}" for x, n in zip(part, names, strict=True) if abs(x) > TAKES_PART]
+            if math.sqrt(max(size, 0.0)) <= DETERMINED and len(named) > 1:
+                out.append(
+                    f"Of what is not identified, {' + '.join(named).replace('+ -', '- ')} is determined."
+                )
+        return out
+
     @property
     def correlation(self) -> Array:
         """Of the estimates, shape (n, n)."""
         kept = [i for i, n in enumerate(self.vector.names) if n != DELAY]
         change = self.vector.jacobian(self.u)[kept]
         return correlation_of(change @ self.covariance @ change.T)
+
+
+DETERMINED = math.log(2.0) / (2.0 * QUANTILE)
+"""Standard deviation of a logarithm at which a 95 % interval spans a factor of two: what identified means."""
+TAKES_PART = 0.3
+"""Coefficient from which on a parameter is named in a combination."""
 
 
 def correlation_of(covariance: Array) -> Array:

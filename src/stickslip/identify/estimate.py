@@ -38,6 +38,10 @@ class Estimate:
     identified : bool
     verdict : str
         Why it is not identified; empty where it is.
+    cause : str
+        The alternative model that widens it most ("play", "cogging 4", ...); empty where none has a third of it.
+    share : float
+        That alternative's part of the variance.
     """
 
     name: str
@@ -49,6 +53,8 @@ class Estimate:
     upper: float
     identified: bool
     verdict: str = ""
+    cause: str = ""
+    share: float = 0.0
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -67,6 +73,7 @@ class Estimate:
             "name": self.name, "unit": self.unit, "symbol": self.symbol,
             **{k: v if math.isfinite(v) else None for k, v in numbers.items()},
             "identified": self.identified, "verdict": self.verdict,
+            **({"cause": self.cause, "share": self.share} if self.cause else {}),
         }  # fmt: skip
 
 
