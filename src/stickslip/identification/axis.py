@@ -150,15 +150,15 @@ def identify_axis(
         held = [aligned(t, seen.sliding) for t in held]
         candidates = compared(seen, fitted, held, tried, asked, simulated, progress)
         notes.append(note_on(candidates, tried[choose(candidates)].name))
-    chosen = tried[choose(candidates)] if candidates else tried[0]
+    place = choose(candidates) if candidates else 0
+    chosen, start = tried[place], candidates[place].start if candidates else {}
     own = asked_of(chosen, asked, tried)
     progress(f"{chosen.name}: all of the data")
     why = ""
     if simulated:
         try:
-            return assembled(
-                seen, chosen, own, fit_law(seen.evidence, chosen, own), validation, candidates, notes
-            )
+            fit = fit_law(seen.evidence, chosen, own, start)
+            return assembled(seen, chosen, own, fit, validation, candidates, notes)
         except InputError as error:
             why = f"{NOT_SIMULATED} {error}."
     result = judged(fitted_axis(seen.aligned, axis, chosen, seen.start, own), profiles)
@@ -424,7 +424,8 @@ def finished(
             )
             misfit["held_out_inverse_dynamics_relative"] = plain_error_on(validation, seen.axis, start)
     untold = [e.name for e in estimates if not e.identified]
-    combined = details["slow_motion"].combinations() if "slow_motion" in details else []
+    fit = details.get("slow_motion")
+    combined = fit.combinations() if isinstance(fit, LawFit) else list[str]()
     last = (
         [
             f"Not identified: {', '.join(untold)}; other values of {'it' if len(untold) == 1 else 'them'} fit as well."

@@ -126,7 +126,7 @@ def _repeated(z: Array, strokes: Integers, state: Integers) -> Array:
     own = np.bincount(owner, numbers.astype(np.float64) ** 2)
     pairs = float(np.sum(count**2 - own))
     rho = float(np.sum(sums**2 - squares)) / max(pairs, 1.0) / max(float(np.mean(z * z)), 1e-300)
-    return 1.0 + min(max(rho, 0.0), 1.0) * (np.bincount(owner)[cell] - 1.0)
+    return np.asarray(1.0 + min(max(rho, 0.0), 1.0) * (np.bincount(owner)[cell] - 1.0), dtype=np.float64)
 
 
 def _rounded(block: Block) -> Array:

@@ -191,7 +191,7 @@ class Posterior:
             + np.eye(2)
             - np.einsum("pfi,pfj->fij", beside * s, w, optimize=True)
         )
-        spread = np.linalg.inv(schur)
+        spread: Array = np.asarray(np.linalg.inv(schur))
         z_base = z[:, None] - beside @ m
         right = self.fall_right.reshape(n, 2)
         z_fall = (right - (mean @ self.cross).reshape(n, 2) - self.fall_gram @ m) * s
@@ -269,15 +269,15 @@ class Posterior:
 
 def _inverse(a: Array) -> tuple[Array, float]:
     """Inverse and logarithm of the determinant of a positive definite matrix."""
-    from scipy.linalg.lapack import dpotrf, dpotri
+    from scipy.linalg import lapack
 
-    factor, failed = dpotrf(a, lower=1)
+    solver: Any = lapack
+    factor, failed = solver.dpotrf(a, lower=1)
     if failed:
         raise np.linalg.LinAlgError("not positive definite")
     log_det = 2.0 * float(np.sum(np.log(np.diag(factor))))
-    half, _ = dpotri(factor, lower=1)
-    lower = np.tril(half)
-    return lower + np.tril(half, -1).T, log_det
+    half: Array = solver.dpotri(factor, lower=1)[0]
+    return np.asarray(np.tril(half) + np.tril(half, -1).T), log_det
 
 
 def log_sum(x: Array) -> float:

@@ -68,7 +68,7 @@ class Block:
 
             weights = window_weights(self.half, self.record.period, (order,))[0]
             m = weights.size // 2
-            columns = (self.centres[:, None] + np.arange(-m, m + 1)).ravel()
+            columns: Any = np.add.outer(self.centres, np.arange(-m, m + 1)).ravel()
             ends = np.arange(self.centres.size + 1) * weights.size
             shape = (self.centres.size, self.record.time.size)
             kept[order] = csr_matrix((np.tile(weights, self.centres.size), columns, ends), shape=shape)
@@ -253,8 +253,8 @@ def _block(record: SlidingRecord, width: int, half: float) -> Block:
     """Rows of one width whose windows lie inside strokes."""
     m = window_weights(half, record.period, (0,)).shape[1] // 2
     hop = max(1, int(half / record.period / OVERLAP))
-    centres = [np.arange(i + m + 1, j - m - 1, hop) for i, j in record.strokes]
-    kept = np.concatenate(centres) if centres else np.zeros(0, dtype=np.int64)
+    centres: list[Integers] = [np.arange(i + m + 1, j - m - 1, hop) for i, j in record.strokes]
+    kept: Integers = np.concatenate(centres) if centres else np.zeros(0, dtype=np.int64)
     inside = (kept >= m) & (kept < record.time.size - m)
     return Block(record, width, half, kept[inside].astype(np.int64))
 

@@ -34,6 +34,7 @@ from stickslip.identification.rows import LATEST, SlidingRows
 from stickslip.identification.strokes import SlidingRecord
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Places = np.ndarray[Any, np.dtype[np.intp]]
 
 ROUNDS = 8
 """Of weights, levels and delay in turn: the last changes nothing that could be seen on most records."""
@@ -141,65 +142,114 @@ def settle(rows: SlidingRows, asked: Asked, skew: float, widths: Sequence[int] =
     widths : sequence of int
         Widths that the first fit looks at; all where empty.
     """
-    begin = asked.skew if asked.skew is not None else skew
-    skew = begin
-    torque, around = rows.torque(skew), gravity_columns(rows) if asked.pendulum else None
-    start, gravity, residual = first_fit(rows, torque, widths, around)
-    size = float(np.std(torque)) or 1e-300
-    pace = float(np.sqrt(np.mean(rows.acceleration**2))) or 1e-300
-    level = Level(max(start[0], 1e-3 * size / pace), max(start[1], 0.02 * size), 0.0, rows.period)
-    falls = falls_of(rows, rows.fastest * np.geomspace(SLOWEST_FALL, FASTEST_FALL, COARSE), asked.exponents)
-    alternatives = [*usual_alternatives(rows), *registry_for(start, gravity)]
-    columns = [a.columns(rows) for a in alternatives]
-    rates = [a.columns(rows.rates) if a.lags else None for a in alternatives]
-    usual, numbers = len(alternatives), candidates(rows, asked.period)
-    on: On = (0,) * usual
-    moving: Array | float = 0.0
-    near: Array | None = None
-    for number in range(ROUNDS):
-        noise = noise_of(rows, residual, level.inertia, level.friction)
-        level = level._replace(noise=noise.accelerating)
-        core = core_of(rows, asked, level, skew, moving, size, pace)
-        posterior = Posterior(core, torque, noise.weight, alternatives, columns, falls, level, rows)
-        on, looked, family = climb(posterior, on, near)
-        top = int(np.argmax(family.log_evidence))
-        if number == ROUNDS - 1:
-            break
-        residual = torque - posterior.predicted(family, top)
-        if number < ORDER_ROUNDS:
-            beside = posterior.fixed_columns(top, range(usual, len(alternatives)))
-            known = {a.name for a in alternatives}
-            root = np.sqrt(noise.weight)
-            for order in find_orders(rows, root, torque, beside, level.friction, numbers.tolist()):
-                if (more := order_of(order)).name not in known:
-                    alternatives.append(more)
-                    columns.append(more.columns(rows))
-                    rates.append(more.columns(rows.rates))
-                    on = (*on, 0)
-        moving = family.mean[top][2] * rows.acceleration
-        if asked.pendulum:
-            moving = (
-                moving
-                + gravity_columns(rows.rates) @ family.mean[top][[core.names.index(n) for n in GRAVITY]]
-            )
-        for block, rate in zip(posterior.blocks, rates, strict=False):
-            if rate is not None:
-                moving = moving + level.friction * rate @ family.mean[top][block]
-        level = level._replace(
-            inertia=max(float(family.mean[top][0]), SHRINK * level.inertia),
-            friction=max(float(family.mean[top][1]), SHRINK * level.friction),
+    search = Search(rows, asked, skew if asked.skew is None else asked.skew, widths)
+    for number in range(ROUNDS - 1):
+        search.look()
+        search.improve(number)
+    return search.look()
+
+
+class Search:
+    """One search: where it stands, and the steps that improve it.
+
+    Parameters
+    ----------
+    rows, asked, skew, widths
+        As of `settle`.
+    """
+
+    def __init__(self, rows: SlidingRows, asked: Asked, skew: float, widths: Sequence[int]) -> None:
+        self.rows, self.asked, self.begin, self.skew = rows, asked, skew, skew
+        self.torque = rows.torque(skew)
+        around = gravity_columns(rows) if asked.pendulum else None
+        start, gravity, self.residual = first_fit(rows, self.torque, widths, around)
+        self.size = float(np.std(self.torque)) or 1e-300
+        self.pace = float(np.sqrt(np.mean(rows.acceleration**2))) or 1e-300
+        inertia, friction = max(float(start[0]), 1e-3 * self.size / self.pace), max(float(start[1]), 0.02 * self.size)
+        self.level = Level(inertia, friction, 0.0, rows.period)
+        speeds = rows.fastest * np.geomspace(SLOWEST_FALL, FASTEST_FALL, COARSE)
+        self.falls, self.near = falls_of(rows, speeds, asked.exponents), None
+        self.alternatives, self.columns, self.rates = list[Alternative](), list[Array](), list[Array | None]()
+        self.on: On = ()
+        for alternative in (*usual_alternatives(rows), *registry_for(start, gravity)):
+            self.add(alternative)
+        self.usual, self.numbers = len(self.alternatives), candidates(rows, asked.period).tolist()
+        self.moving: Array | float = 0.0
+        self.posterior: Posterior
+        self.fit: Fit
+
+    def add(self, alternative: Alternative) -> None:
+        """Weigh one more alternative, absent at first."""
+        self.alternatives.append(alternative)
+        self.columns.append(alternative.columns(self.rows))
+        self.rates.append(alternative.columns(self.rows.rates) if alternative.lags else None)
+        self.on = (*self.on, 0)
+
+    def look(self) -> Fit:
+        """Weights and levels about where it stands."""
+        noise = noise_of(self.rows, self.residual, self.level.inertia, self.level.friction)
+        self.level = self.level._replace(noise=noise.accelerating)
+        core = core_of(self.rows, self.asked, self.level, self.skew, self.moving, self.size, self.pace)
+        self.posterior = Posterior(
+            core,
+            self.torque,
+            noise.weight,
+            self.alternatives,
+            self.columns,
+            self.falls,
+            self.level,
+            self.rows,
         )
-        skew = moved_skew(posterior, family, top, skew, rows)
+        self.on, looked, family = climb(self.posterior, self.on, self.near)
+        self.fit = Fit(
+            self.skew, self.level, [*self.alternatives], [*self.columns], core, self.torque, self.falls, self.on,
+            looked, family, noise, self.rows,
+        )  # fmt: skip
+        return self.fit
+
+    def improve(self, number: int) -> None:
+        """Orders of cogging, sizes, delay and velocities of friction's fall, after a look in round `number`."""
+        family = self.fit.family
+        top = int(np.argmax(family.log_evidence))
+        mean = family.mean[top]
+        self.residual = self.torque - self.posterior.predicted(family, top)
+        if number < ORDER_ROUNDS:
+            self.add_orders(top)
+        self.moving = self.model_rate(mean)
+        self.level = self.level._replace(
+            inertia=max(float(mean[0]), SHRINK * self.level.inertia),
+            friction=max(float(mean[1]), SHRINK * self.level.friction),
+        )
+        self.skew = moved_skew(self.posterior, family, top, self.skew, self.rows)
         if number == ORDER_ROUNDS - 1:
-            if len(alternatives) > usual:
+            self.falls, self.near = finer(self.rows, self.posterior, family, self.asked), None
+            if len(self.alternatives) > self.usual:
                 # What stood for cogging before its orders were known is to be weighed anew beside them.
-                on, moving = tuple(int(k >= usual) for k in range(len(alternatives))), 0.0
-                skew = begin
-            falls, near = finer(rows, posterior, family, asked)
+                self.on = tuple(int(k >= self.usual) for k in range(len(self.alternatives)))
+                self.moving, self.skew = 0.0, self.begin
         elif number >= ORDER_ROUNDS:
-            near = neighbours(family, falls)
-        torque = rows.torque(skew)
-    return Fit(skew, level, alternatives, columns, core, torque, falls, on, looked, family, noise, rows)
+            self.near = neighbours(family, self.falls)
+        self.torque = self.rows.torque(self.skew)
+
+    def add_orders(self, top: int) -> None:
+        """Add the orders of cogging that show beside the plain model and those known already."""
+        beside = self.posterior.fixed_columns(top, range(self.usual, len(self.posterior.alternatives)))
+        root, known = np.sqrt(self.fit.noise.weight), {a.name for a in self.alternatives}
+        for number in find_orders(self.rows, root, self.torque, beside, self.level.friction, self.numbers):
+            if (more := order_of(number)).name not in known:
+                self.add(more)
+
+    def model_rate(self, mean: Array) -> Array:
+        """Time derivative of what the model says beside the inertia's torque: a late torque shifts that too."""
+        names = self.fit.core.names
+        out = mean[names.index("sigma2")] * self.rows.acceleration
+        if self.asked.pendulum:
+            out = out + gravity_columns(self.rows.rates) @ mean[[names.index(n) for n in GRAVITY]]
+        # Orders that were just added have no coefficients yet.
+        for block, rate in zip(self.posterior.blocks, self.rates, strict=False):
+            if rate is not None:
+                out = out + self.level.friction * rate @ mean[block]
+        return np.asarray(out, dtype=np.float64)
 
 
 SHRINK = 0.3
@@ -277,22 +327,25 @@ def first_fit(
         What is left, N·m (N).
     """
     falls = falls_of(rows, np.array(FIRST_FALLS) * rows.fastest, EXPONENTS[:1]).alike
-    gravity = np.zeros((torque.size, 0)) if around is None else around
-    x = np.column_stack([rows.acceleration, rows.sign, rows.velocity, np.ones(torque.size), gravity, falls])
+    beside = np.zeros((torque.size, 0)) if around is None else around
+    x = np.column_stack([rows.acceleration, rows.sign, rows.velocity, np.ones(torque.size), beside, falls])
     use = np.ones(torque.size) if not widths else np.isin(rows.band + 1.0, widths) + 1e-3
-    unit, theta = np.ones(torque.size), np.zeros(x.shape[1])
+    unit = np.ones(torque.size)
+    theta: Array = np.zeros(x.shape[1])
     for _ in range(ROUNDS):
         scaled = x / unit[:, None]
         norms = np.sqrt(np.sum(scaled**2, axis=0)) + 1e-300
         z = scaled / norms
-        theta = np.linalg.solve(z.T @ z + 1e-9 * np.eye(x.shape[1]), z.T @ (torque / unit)) / norms
+        theta = np.asarray(
+            np.linalg.solve(z.T @ z + 1e-9 * np.eye(x.shape[1]), z.T @ (torque / unit)) / norms
+        )
         left = np.abs(torque - x @ theta)
         unit = np.sqrt(left + 1e-3 * float(np.median(np.abs(torque))) + 1e-300) / use
-    sine, cosine = (0.0, 0.0) if around is None else theta[4:6].tolist()
-    return theta[:4], (sine, cosine), torque - x @ theta
+    gravity = (0.0, 0.0) if around is None else (float(theta[4]), float(theta[5]))
+    return theta[:4], gravity, torque - x @ theta
 
 
-def climb(posterior: Posterior, on: On, near: Array | None) -> tuple[On, dict[On, float], Family]:
+def climb(posterior: Posterior, on: On, near: Places | None) -> tuple[On, dict[On, float], Family]:
     """Change the level that raises the evidence most until none does; every combination seen, with its evidence.
 
     `near` are the members (0: no fall) that count; all where None.
@@ -300,11 +353,10 @@ def climb(posterior: Posterior, on: On, near: Array | None) -> tuple[On, dict[On
     looked: dict[On, float] = {}
     family = posterior.family(on)
     for _ in range(STEPS):
-        evidence = family.log_evidence if near is None else family.log_evidence[near]
+        counts = np.arange(family.log_evidence.size) if near is None else near
+        evidence = family.log_evidence[counts]
         looked[on] = log_sum(evidence)
-        top = float(np.max(evidence))
-        places = np.flatnonzero(evidence > top - NEAR)
-        places = places if near is None else near[places]
+        places = counts[evidence > np.max(evidence) - NEAR]
         changed = posterior.changes(family, places)
         # Neighbours are worth as much more than this combination as they are for the members looked at.
         beyond = looked[on] - log_sum(family.log_evidence[places])
@@ -327,20 +379,18 @@ def moved_skew(posterior: Posterior, family: Family, place: int, skew: float, ro
     return float(np.clip(skew + np.clip(step, -rows.period, rows.period), -most, most))
 
 
-def finer(
-    rows: SlidingRows, posterior: Posterior, family: Family, asked: Asked
-) -> tuple[Falls, Array | None]:
+def finer(rows: SlidingRows, posterior: Posterior, family: Family, asked: Asked) -> Falls:
     """Finer velocities about those of friction's fall that count."""
     evidence, speeds = family.log_evidence, np.unique(posterior.falls.speed)
     good = np.flatnonzero(evidence[1:] > np.max(evidence) - 2.0 * NEAR)
     if not good.size:
-        return posterior.falls, None
+        return posterior.falls
     place = np.searchsorted(speeds, posterior.falls.speed[good])
     low, high = speeds[max(place.min() - 2, 0)], speeds[min(place.max() + 2, speeds.size - 1)]
-    return falls_of(rows, np.geomspace(low, high, FINE), asked.exponents), None
+    return falls_of(rows, np.geomspace(low, high, FINE), asked.exponents)
 
 
-def neighbours(family: Family, falls: Falls) -> Array:
+def neighbours(family: Family, falls: Falls) -> Places:
     """Members that count, and those of the next velocities."""
     good = np.flatnonzero(family.log_evidence > np.max(family.log_evidence) - FAR)
     around = np.concatenate([good - 1, good, good + 1, [0]])

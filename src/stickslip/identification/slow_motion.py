@@ -35,7 +35,7 @@ from stickslip.identify.fit.jackknife import leave_blocks_out
 from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parallel import mapped
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
-from stickslip.identify.fit.sample_rate_limit import unseen_refused
+from stickslip.identify.fit.sample_rate_limit import unresolved_refused, unseen_refused
 from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.fit.uncertainty import verdict_on
 from stickslip.identify.observer.innovations import (
@@ -69,6 +69,11 @@ UNMODELLED = 3.0
 observer): chosen by coverage on 51 simulated logs (`benchmarks/ordinary_logs.py`, seeds 8200000, every 13th cell)."""
 DELAY_PRIOR = 0.6
 """Rows, as of sliding: where no sliding tells the delay."""
+TRUST = 100.0
+"""Times the simulation's variance that counts against sliding's: what sliding resolves to ten times the simulation's
+standard deviation is sliding's, and the simulation tells the rest (a resolution matrix: Backus and Gilbert 1968)."""
+EDGE = 1e-4
+"""Coordinates over which the steady friction is differentiated."""
 ALIKE = 1e-3
 """Part of friction by which any law's steady torque may be off."""
 
@@ -198,7 +203,9 @@ def curve_prior(law: Law, sliding: SlidingPosterior | None) -> Prior | None:
     if sliding is None or law.steady is None:
         return None
     mean, covariance = moments(sliding, curve_places(sliding))
-    root = np.linalg.inv(np.linalg.cholesky(covariance + form_of(sliding)))
+    root: Array = np.asarray(
+        np.linalg.inv(np.linalg.cholesky(covariance + form_of(sliding))), dtype=np.float64
+    )
     return Prior(mean, root, curve_seen(law, sliding.speeds))
 
 
@@ -339,6 +346,7 @@ def fit_law(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any]
     estimates = unseen_refused(
         estimates, law, accepted, named["inertia"], highest, max(m.period for m in seen.motions)
     )
+    estimates = unresolved_refused(estimates, law, accepted, evidence.experiments, level)
     return LawFit(
         vector, u, combined.covariance, Model(law, **accepted._asdict()), estimates, combined.contradiction,
         tuple(criterion.corrections(u)),
@@ -440,49 +448,48 @@ class Combined:
 def combine(
     criterion: Criterion, u: Array, alone: Array, covariance: Array, sliding: SlidingPosterior | None
 ) -> Combined:
-    """The simulation's own estimate and every member of sliding, each weighted by its precision.
+    """What sliding resolves of the law from every member of sliding, the rest from the simulation.
 
     Parameters
     ----------
     criterion : Criterion
         Whose prior sees the steady friction.
     u : array, shape (p,)
-        About which that is linear.
+        About which that is linear at first.
     alone, covariance : array, shape (p,), (p, p)
         What the simulation says by itself.
     sliding : SlidingPosterior or None
     """
-    prior = criterion.prior
-    if prior is None or sliding is None or criterion.law.steady is None:
+    if criterion.prior is None or sliding is None or criterion.law.steady is None:
         return Combined(np.ones(1), alone[None, :], covariance[None, :, :], 0.0)
-    seen = criterion.prior_seen
-    there = seen(u)
-    change = np.column_stack([(seen(u + h) - seen(u - h)) / (2.0 * h.max()) for h in 1e-4 * np.eye(u.size)])
-    own = there + change @ (alone - u)
-    mean, spread = moments(sliding, curve_places(sliding))
+    found = _beside(criterion, u, alone, covariance, sliding)
+    return _beside(criterion, found.weights @ found.means, alone, covariance, sliding)
+
+
+def _beside(
+    criterion: Criterion, u: Array, alone: Array, covariance: Array, sliding: SlidingPosterior
+) -> Combined:
+    """As `combine`, steady friction linear about u."""
+    seen, places = criterion.prior_seen, curve_places(sliding)
+    u = np.clip(u, criterion.vector.lower + EDGE, criterion.vector.upper - EDGE)
+    change = np.column_stack([(seen(u + h) - seen(u - h)) / (2.0 * EDGE) for h in EDGE * np.eye(u.size)])
+    own = seen(u) + change @ (alone - u)
+    mean, spread = moments(sliding, places)
     apart, both = mean - own, change @ covariance @ change.T + spread + form_of(sliding)
+    # What contradicts sliding is the simulation's fault.
     beyond = np.maximum(apart**2 - np.diag(both), 0.0)
     back = covariance @ change.T @ np.linalg.pinv(both)
     covariance = covariance + back @ np.diag(beyond) @ back.T
-    places = curve_places(sliding)
-    wider = (sliding.width / QUANTILE) ** 2
-    logs, means, inner = list[float](), list[Array](), list[Array]()
+    less = TRUST * covariance
+    means, inner = list[Array](), list[Array]()
     for m in sliding.members:
-        whole = (
-            change @ covariance @ change.T + wider * m.covariance[np.ix_(places, places)] + form_of(sliding)
-        )
-        gain = np.linalg.solve(whole, change @ covariance).T
-        left = m.mean[places] - own
-        logs.append(
-            math.log(m.weight)
-            - 0.5 * float(left @ np.linalg.solve(whole, left))
-            - 0.5 * float(np.linalg.slogdet(whole)[1])
-        )
-        means.append(alone + gain @ left)
-        inner.append(covariance - gain @ change @ covariance)
-    weights = np.exp(np.array(logs) - max(logs))
+        known = (sliding.width / QUANTILE) ** 2 * m.covariance[np.ix_(places, places)] + form_of(sliding)
+        gain = np.linalg.solve(change @ less @ change.T + known, change @ less).T
+        rest = np.eye(u.size) - gain @ change
+        means.append(alone + gain @ (m.mean[places] - own))
+        inner.append(rest @ covariance @ rest.T + gain @ known @ gain.T)
     contradiction = math.sqrt(float(np.mean(apart**2 / np.diag(both))))
-    return Combined(weights / weights.sum(), np.array(means), np.array(inner), contradiction)
+    return Combined(sliding.weights, np.array(means), np.array(inner), contradiction)
 
 
 def estimates_of(vector: Vector, found: Combined, u: Array, level: float) -> tuple[Estimate, ...]:

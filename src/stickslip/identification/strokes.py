@@ -109,7 +109,8 @@ def narrowest_half(experiment: Experiment) -> float:
         if 2 * m + 1 >= q.size:
             break
         stride = max(1, m // 2)
-        acceleration = apply_at(q - q[0], np.arange(m, q.size - m, stride), weights)
+        centres: Rows = np.arange(m, q.size - m, stride)
+        acceleration = apply_at(q - q[0], centres, weights)
         if (noise * float(np.linalg.norm(weights))) ** 2 <= NOISE_SHARE * float(np.var(acceleration)):
             return half
         half *= WIDEN
@@ -140,7 +141,7 @@ def sliding_record(
     period = 1.0 / rate
     weights = unblurred_weights(max(LEAST_SAMPLES * period, 0.5 * half), period)
     m = weights.shape[1] // 2
-    inner = np.arange(m, q.size - m)
+    inner: Rows = np.arange(m, q.size - m)
     moved = q - q[0]
     v, a = np.zeros(q.size), np.zeros(q.size)
     v[inner], a[inner] = apply_at(moved, inner, weights).T

@@ -16,12 +16,15 @@ from typing import Any
 import numpy as np
 
 from stickslip.identify.estimate import Estimate
+from stickslip.identify.experiment import Experiment
 from stickslip.spec import Law, Surroundings
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SAMPLES = 3.0
 """Samples that a period of the contact's vibration must have."""
+REVERSING = 0.05
+"""Part of the usual highest speed below which an axis is about to reverse or stop."""
 TINY, SOON = 1e-9, 1e-3
 """rad (m) by which a contact is moved to feel its stiffness, in a second; s within which its damping is felt, too."""
 SLOWER = 10.0 ** np.arange(-4.0, 0.0, 0.25)
@@ -156,3 +159,62 @@ def unseen_refused(
         if e.identified and of_slow_motion(law, parameters, e.name, highest, names) else e
         for e in estimates
     )  # fmt: skip
+
+
+def unresolved_refused(
+    estimates: Sequence[Estimate], law: Law, parameters: Any, experiments: Sequence[Experiment], friction: float
+) -> tuple[Estimate, ...]:
+    """The estimates, those of pre-sliding refused where the contact passes its pre-sliding travel within few samples.
+
+    Parameters
+    ----------
+    estimates : sequence of Estimate
+    law : Law
+    parameters : NamedTuple
+        The law's.
+    experiments : sequence of Experiment
+    friction : float
+        Level of friction, N·m (N): over the stiffness at rest it is the pre-sliding travel.
+    """
+    stiffness = stiffness_at_rest(law, parameters)
+    if stiffness == 0.0:
+        return tuple(estimates)
+    travel = friction / stiffness
+    rows = np.concatenate([samples_within(t, travel) for t in experiments])
+    typical = float(np.median(rows)) if rows.size else 0.0
+    if typical >= SAMPLES:
+        return tuple(estimates)
+    why = (
+        f"the contact passes its pre-sliding travel, {travel:.2g}, within {typical:.2g} samples of a reversal; record "
+        f"slower reversals, or sample faster, for {SAMPLES:g} or more"
+    )
+    speeds = np.geomspace(1e-3, 1e3, 20)
+    return tuple(
+        replace(e, identified=False, verdict=why)
+        if e.identified and of_presliding(law, parameters, e.name, speeds) else e for e in estimates
+    )  # fmt: skip
+
+
+def of_presliding(law: Law, parameters: Any, name: str, speeds: Array) -> bool:
+    """Whether a number of the law has no effect on its torque at constant velocity."""
+    if law.steady is None or name not in numbers_of(law, parameters):
+        return False
+    return not np.any(effect_of(law, parameters, name, speeds))
+
+
+def samples_within(experiment: Experiment, travel: float) -> Array:
+    """Samples behind every reversal or start until the position is farther than `travel`, shape (reversals,)."""
+    q, speed = experiment.position, np.abs(experiment.velocity())
+    fast = float(np.quantile(speed, 0.95))
+    slow = speed < REVERSING * fast
+    begins = np.flatnonzero(np.diff(slow.astype(np.int8)) == 1) + 1
+    out: list[float] = []
+    for begin in begins.tolist():
+        # From the last sample at which it is as good as at rest until it has left.
+        rest = slow[begin:]
+        leaves = begin + (int(np.argmin(rest)) if not rest.all() else rest.size - 1)
+        still = begin + int(np.argmin(speed[begin : leaves + 1]))
+        away = np.abs(q[still:] - q[still]) > travel
+        if away.any():
+            out.append(float(np.argmax(away)))
+    return np.array(out)
