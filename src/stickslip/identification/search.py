@@ -165,7 +165,10 @@ class Search:
         start, gravity, self.residual = first_fit(rows, self.torque, widths, around)
         self.size = float(np.std(self.torque)) or 1e-300
         self.pace = float(np.sqrt(np.mean(rows.acceleration**2))) or 1e-300
-        inertia, friction = max(float(start[0]), 1e-3 * self.size / self.pace), max(float(start[1]), 0.02 * self.size)
+        inertia, friction = (
+            max(float(start[0]), 1e-3 * self.size / self.pace),
+            max(float(start[1]), 0.02 * self.size),
+        )
         self.level = Level(inertia, friction, 0.0, rows.period)
         speeds = rows.fastest * np.geomspace(SLOWEST_FALL, FASTEST_FALL, COARSE)
         self.falls, self.near = falls_of(rows, speeds, asked.exponents), None

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.binding import NEGATIVE
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.mixture import NEGLIGIBLE, Member, Mixture, mix
 from stickslip.identification.rows import SlidingRows, sample_rows, sliding_rows
@@ -125,6 +126,14 @@ class SlidingPosterior:
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval of a number."""
         return self.numbers[name].interval
+
+    @property
+    def law_names(self) -> dict[str, str]:
+        """Names under which level and slope of friction stand here, by their names in laws."""
+        if "fc_negative" not in self.names:
+            return {n: n for n in ("fc", "sigma2")}
+        ways = (("", "positive"), (NEGATIVE, "negative"))
+        return {f"{n}{law}": f"{n}_{own}" for n in ("fc", "sigma2") for law, own in ways}
 
     @property
     def alternatives(self) -> dict[str, Alternative]:

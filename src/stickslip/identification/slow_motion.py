@@ -7,8 +7,8 @@ is inside: the simulated axis gets the torque when it acted.
 
 Inertia, constant torque, gravity and delay are those of gross sliding, which assumes less, and nothing feeds back to
 them (a cut posterior: Plummer 2015). The law's steady friction at the speeds of sliding is known from there too, as a
-prior. Where the simulation contradicts it, the difference is the simulation's: its variance grows by that (DerSimonian
-and Laird 1986, of the estimator that assumes more).
+prior; where the simulation contradicts it, its intervals grow (Birge 1932). Level and slope are then sliding's own;
+friction at rest and its velocity, of which both tell, are combined by their precision (DerSimonian and Laird 1986).
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
-from stickslip.identification.sliding import QUANTILE, SlidingPosterior, quantiles
+from stickslip.identification.sliding import QUANTILE, SlidingPosterior
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.axis.problem import mechanics_of
 from stickslip.identify.axis.search import Asked, laid_out
@@ -37,7 +38,7 @@ from stickslip.identify.fit.parallel import mapped
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.sample_rate_limit import unresolved_refused, unseen_refused
 from stickslip.identify.fit.student import student_quantile
-from stickslip.identify.fit.uncertainty import verdict_on
+from stickslip.identify.fit.uncertainty import interval_of, verdict_on
 from stickslip.identify.observer.innovations import (
     BLOCK,
     DELAY,
@@ -62,18 +63,11 @@ SETTLED = 1e-3
 """Relative decrease of the sum of squares at which a search ends."""
 TOLERANCE = 1e-4
 """The same of the last descent."""
-LONGEST_STEP = 1.0
-"""Coordinates (factors of e) by which the data's own minimum may lie beside the one with the prior."""
 UNMODELLED = 3.0
 """Factor on the simulation's standard deviations, for what no part of it describes (torque between rows, ringing, the
 observer): chosen by coverage on 51 simulated logs (`benchmarks/ordinary_logs.py`, seeds 8200000, every 13th cell)."""
 DELAY_PRIOR = 0.6
 """Rows, as of sliding: where no sliding tells the delay."""
-TRUST = 100.0
-"""Times the simulation's variance that counts against sliding's: what sliding resolves to ten times the simulation's
-standard deviation is sliding's, and the simulation tells the rest (a resolution matrix: Backus and Gilbert 1968)."""
-EDGE = 1e-4
-"""Coordinates over which the steady friction is differentiated."""
 ALIKE = 1e-3
 """Part of friction by which any law's steady torque may be off."""
 
@@ -334,52 +328,58 @@ def fit_law(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any]
     search = criterion.search(u)
     search.run(STEPS, SETTLED)
     optimum = criterion.descend(search.u, 12, TOLERANCE)
-    alone, covariance = from_data(criterion, optimum, evidence)
-    combined = combine(criterion, optimum.u, alone, covariance, evidence.sliding)
-    vector = criterion.vector
-    u = np.clip(combined.weights @ combined.means, vector.lower, vector.upper)
+    vector, u = criterion.vector, optimum.u
+    covariance, contradiction = spread_of(criterion, optimum, evidence)
+    model = model_at(law, vector, u)
+    found = [own_estimate(vector, k, u, covariance, level) for k in range(len(vector.free))]
+    if evidence.sliding is not None and means_the_same(model, evidence.sliding.speeds):
+        found = [
+            beside_sliding(e, p, evidence.sliding, level) for e, p in zip(found, vector.free, strict=True)
+        ]
+        u = vector.coordinates({e.name: e.value for e in found})
+        model = model_at(law, vector, u)
+    highest = max(float(np.max(np.abs(m.seen.velocity))) for m in seen.motions)
+    period, own = max(m.period for m in seen.motions), model.parameters
+    estimates = [e for e in found if e.name != DELAY]
+    estimates = unseen_refused(estimates, law, own, vector.named(u)["inertia"], highest, period)
+    estimates = unresolved_refused(estimates, law, own, evidence.experiments, level)
+    return LawFit(vector, u, covariance, model, estimates, contradiction, tuple(criterion.corrections(u)))
+
+
+def model_at(law: Law, vector: Vector, u: Array) -> Model:
+    """The law at some coordinates, or as near to them as it accepts."""
     accepted = feasible(law, vector.law_parameters(u))
     assert accepted is not None
-    named = vector.named(u)
-    highest = max(float(np.max(np.abs(m.seen.velocity))) for m in seen.motions)
-    estimates = estimates_of(vector, combined, u, level)
-    estimates = unseen_refused(
-        estimates, law, accepted, named["inertia"], highest, max(m.period for m in seen.motions)
-    )
-    estimates = unresolved_refused(estimates, law, accepted, evidence.experiments, level)
-    return LawFit(
-        vector, u, combined.covariance, Model(law, **accepted._asdict()), estimates, combined.contradiction,
-        tuple(criterion.corrections(u)),
-    )  # fmt: skip
+    return Model(law, **accepted._asdict())
 
 
-def from_data(criterion: Criterion, optimum: Any, evidence: Evidence) -> tuple[Array, Array]:
-    """What the simulation says without the prior: its minimum (a Newton step from the one with it) and covariance.
+def spread_of(criterion: Criterion, optimum: Any, evidence: Evidence) -> tuple[Array, float]:
+    """Covariance of the coordinates, and by how much the simulation contradicts sliding, in standard deviations.
 
-    The covariance is that of leaving stretches of time out or of the corrections given back as noise, whichever is
-    larger, and of what sliding leaves open of the axis's own numbers.
+    By leaving stretches of time out or by giving the corrections back as noise, whichever is larger; by the prior and
+    what sliding leaves open of the axis's own numbers. A contradiction widens it all (Birge 1932).
     """
-    u, free = optimum.u, replace(criterion, prior=None)
+    free = replace(criterion, prior=None)
     known = 0 if criterion.prior is None else criterion.prior.mean.size
-    own = replace(
-        optimum, residuals=optimum.residuals[: optimum.residuals.size - known],
-        jacobian=optimum.jacobian[: optimum.jacobian.shape[0] - known],
-    )  # fmt: skip
+    rows = optimum.residuals.size - known
+    own = replace(optimum, residuals=optimum.residuals[:rows], jacobian=optimum.jacobian[:rows])
+    apart, pull = optimum.residuals[rows:], optimum.jacobian[rows:]
+    contradiction = math.sqrt(float(np.mean(apart**2))) if known else 0.0
     r, jacobian = weighted(free, own)
-    ridge = ridge_of(r, u.size)
-    information = jacobian.T @ jacobian + ridge
-    step = np.clip(-np.linalg.solve(information, jacobian.T @ r), -LONGEST_STEP, LONGEST_STEP)
-    blocks = free.blocks(BLOCK)
-    spread = leave_blocks_out(jacobian, r + jacobian @ step, blocks, ridge)
-    noise = perturbed_steps(free, own, np.random.default_rng(0))
+    ridge = ridge_of(r, optimum.u.size)
+    centred = r - jacobian @ np.linalg.solve(jacobian.T @ jacobian + ridge, jacobian.T @ r)
+    held = ridge + pull.T @ pull
+    spread = leave_blocks_out(jacobian, centred, free.blocks(BLOCK), held)
+    noise = perturbed_steps(free, own, np.random.default_rng(0), held)
     variance = np.maximum(np.diag(spread.covariance), np.diag(noise))
-    unit = np.eye(u.size)
-    wider = [student_quantile(max(spread.freedom(e) - 1.0, 1.0)) / QUANTILE for e in unit]
-    size = UNMODELLED * np.array(wider) * np.sqrt(variance / np.diag(spread.covariance))
+    freedom = [max(spread.freedom(e) - 1.0, 1.0) for e in np.eye(optimum.u.size)]
+    wider = UNMODELLED * max(contradiction, 1.0) * np.array([student_quantile(f) / QUANTILE for f in freedom])
+    size = wider * np.sqrt(variance / np.diag(spread.covariance))
     covariance = spread.covariance * np.outer(size, size)
     if evidence.sliding is not None:
-        covariance = covariance + of_the_axis(free, u, evidence.sliding, information, jacobian)
-    return u + step, covariance
+        information = jacobian.T @ jacobian + held
+        covariance = covariance + of_the_axis(free, optimum.u, evidence.sliding, information, jacobian)
+    return covariance, contradiction
 
 
 def of_the_axis(
@@ -419,97 +419,73 @@ def held_elsewhere(vector: Vector, name: str, value: float) -> Vector:
 # ---- beside sliding -------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class Combined:
-    """A mixture over the members of sliding, in the law's coordinates.
+def own_estimate(vector: Vector, place: int, u: Array, covariance: Array, level: float) -> Estimate:
+    """What the simulation says of a free parameter."""
+    p, value, change = vector.free[place], float(vector.values(u)[place]), vector.jacobian(u)[place]
+    std = math.sqrt(max(float(change @ covariance @ change), 0.0))
+    return judged(p, value, *interval_of(p, value, QUANTILE * std, None), level)
 
-    Attributes
-    ----------
-    weights : array, shape (m,)
-    means : array, shape (m, p)
-    inner : array, shape (m, p, p)
-    contradiction : float
+
+def judged(p: Parameter, value: float, low: float, high: float, level: float) -> Estimate:
+    """An estimate with its verdict; torques are compared with friction's level."""
+    scale = 1.0 if p.par.unit == "rad" else level
+    why = verdict_on(p, value, low, high, Noise(1.0, "residual", math.inf), scale)
+    std = (high - low) / (2.0 * QUANTILE)
+    return Estimate(p.name, p.par.unit, p.par.symbol, value, std, low, high, not why, why)
+
+
+def beside_sliding(e: Estimate, p: Parameter, sliding: SlidingPosterior, level: float) -> Estimate:
+    """Level and slope as sliding has them; of friction at rest and its velocity, of which both tell, both.
+
+    Each counts by its precision, in logarithms; where they contradict each other the variance between them is added to
+    both (DerSimonian and Laird 1986).
     """
+    both_ways = f"fc{NEGATIVE}" in sliding.law_names
+    name = sliding.law_names.get(p.name, "")
+    if name:
+        x = sliding.numbers[name]
+        low, high = max(x.lower, p.par.lower), min(x.upper, p.par.upper)
+        return judged(p, min(max(x.value, low), max(high, low)), low, max(high, low), level)
+    if p.name not in ("fs", "vs") or both_ways or "vs" not in sliding.numbers:
+        return e
+    other = sliding.numbers[p.name]
+    if not (e.value > 0.0 and e.lower > 0.0 and other.value > 0.0 and other.lower > 0.0):
+        return e
+    own = math.log(e.upper / e.lower) / (2.0 * QUANTILE)
+    theirs = math.log(other.upper / other.lower) / (2.0 * QUANTILE)
+    # Of a fall that may be none at all its velocity says as much less.
+    theirs /= sliding.falls if p.name == "vs" else 1.0
+    apart = math.log(other.value / e.value)
+    between = max(0.0, 0.5 * (apart**2 - own**2 - theirs**2))
+    weights = 1.0 / (own**2 + between), 1.0 / (theirs**2 + between)
+    value = e.value * math.exp(apart * weights[1] / sum(weights))
+    half = QUANTILE / math.sqrt(sum(weights))
+    return judged(p, value, value * math.exp(-half), value * math.exp(half), level)
 
-    weights: Array
-    means: Array
-    inner: Array
-    contradiction: float
 
-    @property
-    def covariance(self) -> Array:
-        """Of the whole mixture, shape (p, p)."""
-        apart = self.means - self.weights @ self.means
-        return np.asarray(
-            np.einsum("m,mij->ij", self.weights, self.inner) + (apart * self.weights[:, None]).T @ apart
-        )
+OTHERWISE = {"fc": 1.3, "fs": 1.6, "vs": 3.0, "sigma2": 2.0}
+"""Factors of a second set of values at which the curves must be the same: their form is compared, not their values."""
 
 
-def combine(
-    criterion: Criterion, u: Array, alone: Array, covariance: Array, sliding: SlidingPosterior | None
-) -> Combined:
-    """What sliding resolves of the law from every member of sliding, the rest from the simulation.
+def means_the_same(model: Model, speeds: Array) -> bool:
+    """Whether a law's ``fc``, ``fs``, ``vs`` and ``sigma2`` are those of sliding's curve, level, fall and slope.
 
-    Parameters
-    ----------
-    criterion : Criterion
-        Whose prior sees the steady friction.
-    u : array, shape (p,)
-        About which that is linear at first.
-    alone, covariance : array, shape (p,), (p, p)
-        What the simulation says by itself.
-    sliding : SlidingPosterior or None
+    A law of one's own may mean other things by these names: it then has its numbers from the simulation, which the
+    steady friction of sliding holds, as under any other names. Compared at the upper half of sliding's speeds: on a
+    steep slope through zero a contact only creeps.
     """
-    if criterion.prior is None or sliding is None or criterion.law.steady is None:
-        return Combined(np.ones(1), alone[None, :], covariance[None, :, :], 0.0)
-    found = _beside(criterion, u, alone, covariance, sliding)
-    return _beside(criterion, found.weights @ found.means, alone, covariance, sliding)
-
-
-def _beside(
-    criterion: Criterion, u: Array, alone: Array, covariance: Array, sliding: SlidingPosterior
-) -> Combined:
-    """As `combine`, steady friction linear about u."""
-    seen, places = criterion.prior_seen, curve_places(sliding)
-    u = np.clip(u, criterion.vector.lower + EDGE, criterion.vector.upper - EDGE)
-    change = np.column_stack([(seen(u + h) - seen(u - h)) / (2.0 * EDGE) for h in EDGE * np.eye(u.size)])
-    own = seen(u) + change @ (alone - u)
-    mean, spread = moments(sliding, places)
-    apart, both = mean - own, change @ covariance @ change.T + spread + form_of(sliding)
-    # What contradicts sliding is the simulation's fault.
-    beyond = np.maximum(apart**2 - np.diag(both), 0.0)
-    back = covariance @ change.T @ np.linalg.pinv(both)
-    covariance = covariance + back @ np.diag(beyond) @ back.T
-    less = TRUST * covariance
-    means, inner = list[Array](), list[Array]()
-    for m in sliding.members:
-        known = (sliding.width / QUANTILE) ** 2 * m.covariance[np.ix_(places, places)] + form_of(sliding)
-        gain = np.linalg.solve(change @ less @ change.T + known, change @ less).T
-        rest = np.eye(u.size) - gain @ change
-        means.append(alone + gain @ (m.mean[places] - own))
-        inner.append(rest @ covariance @ rest.T + gain @ known @ gain.T)
-    contradiction = math.sqrt(float(np.mean(apart**2 / np.diag(both))))
-    return Combined(sliding.weights, np.array(means), np.array(inner), contradiction)
-
-
-def estimates_of(vector: Vector, found: Combined, u: Array, level: float) -> tuple[Estimate, ...]:
-    """Estimates of the free parameters but the delay, with the mixture's 95 % intervals and verdicts."""
-    scale = vector.signed_scale(level)
-    values, change = vector.values(u), vector.jacobian(u)
-    out = list[Estimate]()
-    for k, p in enumerate(vector.free):
-        if p.name == DELAY:
-            continue
-        place, value = vector.coordinate_of(p.name), float(values[k])
-        std = math.sqrt(max(float(change[k] @ found.covariance @ change[k]), 0.0))
-        if place is None:
-            low, high = value - QUANTILE * std, value + QUANTILE * std
-        else:
-            own = QUANTILE * np.sqrt(np.maximum(found.inner[:, place, place], 0.0))
-            ends = quantiles(found.means[:, place], own, found.weights)
-            low, high = (math.exp(min(x, 700.0)) if p.logarithmic else x * p.scale for x in ends)
-        low, high = max(low, p.par.lower), min(high, p.par.upper)
-        low, high = min(low, value), max(high, value)
-        why = verdict_on(p, value, low, high, Noise(1.0, "residual", math.inf), scale[p.name])
-        out.append(Estimate(p.name, p.par.unit, p.par.symbol, value, std, low, high, not why, why))
-    return tuple(out)
+    law, p = model.law, model.parameters
+    if law.steady is None or not hasattr(p, "fc"):
+        return False
+    v = speeds[speeds.size // 2 :]
+    for factors in ({}, OTHERWISE):
+        q = p._replace(**{n: f * getattr(p, n) for n, f in factors.items() if hasattr(p, n)})
+        usual = float(q.fc) + float(getattr(q, "sigma2", 0.0)) * v
+        if hasattr(q, "fs") and hasattr(q, "vs"):
+            usual = usual + (float(q.fs) - float(q.fc)) * np.exp(
+                -((v / float(q.vs)) ** float(getattr(q, "delta_s", 2.0)))
+            )
+        torque = Steady(law, v, np.ones(v.size)).torque(np.array(law.pack(q)))
+        if np.any(np.abs(torque - usual) > ALIKE * abs(q.fc)):
+            return False
+    return True

@@ -250,8 +250,10 @@ def ridge_of(r: Array, size: int) -> Array:
     return variance / REACH**2 * np.eye(size)
 
 
-def perturbed_steps(criterion: Criterion, optimum: Optimum, rng: np.random.Generator) -> Array:
+def perturbed_steps(criterion: Criterion, optimum: Optimum, rng: np.random.Generator, held: Array) -> Array:
     """Mean square of the steps of Gauss and Newton from the minimum on records with the corrections as noise.
+
+    `held`, shape (p, p), is the information that is there beside the records.
 
     Returns
     -------
@@ -259,7 +261,7 @@ def perturbed_steps(criterion: Criterion, optimum: Optimum, rng: np.random.Gener
     """
     u, vector = optimum.u, criterion.vector
     r, jacobian = weighted(criterion, optimum)
-    newton = -np.linalg.solve(jacobian.T @ jacobian + ridge_of(r, u.size), jacobian.T)
+    newton = -np.linalg.solve(jacobian.T @ jacobian + held, jacobian.T)
     named = vector.named(u)
     parameters, axis = feasible(criterion.law, vector.law_parameters(u)), criterion.mechanics(named)
     lacking = [x.shifted(criterion.late(named, x), axis).raw(axis, parameters) for x in criterion.records]
