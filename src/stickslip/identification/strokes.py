@@ -26,8 +26,8 @@ NOISE_SHARE = 2e-3
 """Part of the acceleration's power that noise of the position may be: least squares bias the inertia by as much."""
 WIDEN = 1.15
 """From one window tried to the next, until noise is that small."""
-MOST_OF_RECORD = 0.02
-"""Part of the record that half a window may be: a hundred windows at least, side by side."""
+MOST_OF_RECORD = 0.05
+"""Part of the record that half a window may be: ten windows at least, side by side."""
 CERTAIN = 6.0
 """Standard deviations of the velocity's noise from which on its sign is certain."""
 CREEP = 0.003

@@ -28,6 +28,8 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 HIGHEST_CUTOFF = 100.0  # Hz, of the position's low-pass, as published for EMPS
 CUTOFF_PER_RATE = 0.1
 BAND_PER_CUTOFF = 0.4  # of the cutoff: the band that is kept after decimation
+HIGHEST_PER_RATE = 0.25  # of a short record's low-pass
+MOST_ENDS = 1.0 / 3.0  # of a record that the filters may take at both ends together
 TAPER = 10.0  # periods of the cutoff left out at both ends, where the filters have not settled
 NOISE_SHARE = 0.01  # largest share of noise in the acceleration's power
 SPARSE = 100.0  # times as many rows on a regular grid as there are samples, at most
@@ -153,7 +155,7 @@ def inverse_dynamics(
     refuse_harmonics(experiments, harmonics)
     if cutoff is not None and not cutoff > 0.0:
         raise InputError(f"cutoff = {cutoff:g} Hz must be greater than 0")
-    corner = min(suitable_cutoff(t) for t in experiments) if cutoff is None else cutoff
+    corner = min(max(suitable_cutoff(t), least_cutoff(t)) for t in experiments) if cutoff is None else cutoff
     columns = [_columns(t, axis, corner, per_direction, harmonics, harmonic_period) for t in experiments]
     names, units = _names(axis, per_direction, harmonics)
     w = np.concatenate([c.matrix for c in columns])
@@ -290,6 +292,12 @@ def white_noise(q: Array, rate: float) -> float:
     high = (f > 0.3 * rate) & (f < 0.49 * rate)
     # A second difference multiplies the spectrum of white noise by (2 - 2 cos)².
     return float(np.median(power[high] / (2.0 - 2.0 * np.cos(2.0 * math.pi * f[high] / rate)) ** 2))
+
+
+def least_cutoff(experiment: Experiment) -> float:
+    """Corner below which the filters take more than `MOST_ENDS` of a record, as far as its rate allows, Hz."""
+    seconds = float(experiment.time[-1] - experiment.time[0])
+    return min(2.0 * TAPER / (MOST_ENDS * seconds), HIGHEST_PER_RATE / experiment.period)
 
 
 def suitable_cutoff(experiment: Experiment) -> float:
