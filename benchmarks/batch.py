@@ -2,13 +2,11 @@
 
 The loop of Table 6 (PD on the low reference, 2.5 s), Fs and Fc each up to `--spread` off. Ours is
 `stickslip.simulation.many.batch` at the loosest tolerance at which 99 % of 200 of the loops end within `--error` of a
-tight run; with no metrics, with four that count nothing, and with all; and
-`stickslip.simulation.many.simd_batch` at 2e-4 s.
+tight run; with no metrics, with four that count nothing, and with all.
 C is `baseline.c` (the same method, compiled here by gcc -O3 -march=native), and, where `--prototypes DIR` names a
-folder with them, the first prototypes: etd.c (event-driven, position on a 1 ms grid) and trim.c (trapezoid at 2e-4 s
-in SIMD lanes, by clang). With `--jax`, trim.c's step in JAX (`jax_step.py`), compiled beforehand. Times are CPU times
-of the process, the least of three rounds taken in turns; laying out counts, compiling does not. Each method is compared
-with C of its own kind: from event to event (judged without compensation), or at a fixed step.
+folder with it, the first prototype etd.c (event-driven, position on a 1 ms grid). With `--jax`, a trapezoid at 2e-4 s
+in JAX (`jax_step.py`), compiled beforehand. Times are CPU times of the process, the least of three rounds taken in
+turns; laying out counts, compiling does not. The ratio to C is judged without compensation.
 
     python benchmarks/batch.py [--cases 10000] [--spread 0.1] [--prototypes DIR] [--jax]
 """
@@ -34,7 +32,7 @@ from stickslip.control.controller import Controller
 from stickslip.simulation.case_arrays import Case
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
-from stickslip.simulation.many import batch, simd_batch
+from stickslip.simulation.many import batch
 
 DURATION = 2.5
 CURVE = closed_loop.CURVE
@@ -43,7 +41,6 @@ SAMPLE = 200
 COARSE = ("position_rms_rad", "position_peak_rad", "velocity_rms_rad_s", "torque_rms_Nm")
 REAL, ARRAY = ctypes.c_double, ctypes.POINTER(ctypes.c_double)
 TIMES_C = 1.3
-TIMES_JAX = 10.0
 STEP = 2e-4
 Column = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -64,11 +61,6 @@ def the_case(name: str, tolerance: float) -> Case:
 def ours(name: str, fs: Column, fc: Column, tolerance: float) -> batch.Batch:
     """The loops, laid out."""
     return batch.prepare(the_case(name, tolerance), {"friction.fs": fs, "friction.fc": fc})
-
-
-def side_by_side(name: str, fs: Column, fc: Column) -> simd_batch.Lanes:
-    """The loops at a fixed step, laid out."""
-    return simd_batch.prepare(the_case(name, 1e-7), {"friction.fs": fs, "friction.fc": fc}, STEP)
 
 
 def built(compiler: str, source: Path, folder: str) -> Any | None:
@@ -140,19 +132,6 @@ def event_driven(library: Any, name: str, fs: Column, fc: Column, tolerance: flo
     return run
 
 
-def trapezoid(library: Any, name: str, fs: Column, fc: Column) -> Callable[[], Column]:
-    """trim.c over the loops."""
-    function = library.batch
-    function.argtypes = [ARRAY, REAL, REAL, ctypes.c_long, ARRAY, ARRAY, ARRAY, ARRAY]
-    p, ends, peaks = prototype_numbers(name), np.zeros(fs.size), np.zeros(fs.size)
-
-    def run() -> Column:
-        function(pointer(p), DURATION, STEP, fs.size, pointer(fs), pointer(fc), pointer(ends), pointer(peaks))
-        return ends.copy()
-
-    return run
-
-
 def loosest(make: Callable[[float], Callable[[], Column]], truth: Column, wanted: float) -> float:
     """The loosest tolerance at which 99 % of the loops end within `wanted` of the truth, rad."""
     for tolerance in TOLERANCES:
@@ -170,19 +149,11 @@ def compare(name: str, options: argparse.Namespace, c: dict[str, Any]) -> None:
     truth = ours(name, *some, 1e-10).run(()).position
     tolerance = loosest(lambda tol: lambda: ours(name, *some, tol).run(()).position, truth, options.error)
     many = ours(name, fs, fc, tolerance)
-    laid_out = {
-        "events": least(lambda: ours(name, fs, fc, tolerance)),
-        "lanes": least(lambda: side_by_side(name, fs, fc)),
-    }
-    fixed = side_by_side(name, fs, fc)
-    fixed[:1].run(())
-    fixed[:1].run(simd_batch.METRICS)
+    laid_out = least(lambda: ours(name, fs, fc, tolerance))
     runs: dict[str, Callable[[], Column]] = {
         "ours, no metrics": lambda: many.run(()).position,
         "ours, 4 metrics": lambda: many.run(COARSE).position,
         "ours, all metrics": lambda: many.run().position,
-        f"ours, lanes ({STEP:g} s)": lambda: fixed.run(()).position,
-        "ours, lanes, 16 metrics": lambda: fixed.run(simd_batch.METRICS).position,
     }
     if "baseline" in c:
         level = loosest(lambda tol: same_method(c["baseline"], name, *some, tol), truth, options.error)
@@ -190,10 +161,8 @@ def compare(name: str, options: argparse.Namespace, c: dict[str, Any]) -> None:
     if "etd" in c:
         level = loosest(lambda tol: event_driven(c["etd"], name, *some, tol), truth, options.error)
         runs[f"C, etd.c ({level:.0e})"] = event_driven(c["etd"], name, fs, fc, level)
-    if "trim" in c:
-        runs["C, trim.c (2e-4 s)"] = trapezoid(c["trim"], name, fs, fc)
     if options.jax:
-        runs["JAX, trim.c's step"] = jax_step.runner(name, fs, fc, DURATION, STEP)
+        runs[f"JAX, trapezoid ({STEP:g} s)"] = jax_step.runner(name, fs, fc, DURATION, STEP)
     times = dict.fromkeys(runs, np.inf)
     errors: dict[str, Column] = {}
     for _ in range(3):
@@ -202,29 +171,20 @@ def compare(name: str, options: argparse.Namespace, c: dict[str, Any]) -> None:
             ends = run()
             times[label] = min(times[label], time.process_time() - start)
             errors[label] = np.abs(ends[:SAMPLE] - truth)
-    print(
-        f"{name}, {options.cases} loops, ours at {tolerance:.0e} rad, laid out in {laid_out['events']:.3f} s"
-    )
+    print(f"{name}, {options.cases} loops, ours at {tolerance:.0e} rad, laid out in {laid_out:.3f} s")
     for label in runs:
         e = errors[label]
         worse = f"median {np.median(e):.1e}, 99 % {np.percentile(e, 99):.1e} rad"
         print(f"    {label:28} {times[label]:8.3f} s   error: {worse}")
     bare, metered = times["ours, no metrics"], times["ours, all metrics"]
     print(f"          {metered / bare:.2f} times as long with all metrics as with none")
-    events = times["ours, no metrics"] + laid_out["events"]
-    steps = times[f"ours, lanes ({STEP:g} s)"] + laid_out["lanes"]
     for label in runs:
-        if label.startswith("C"):
-            ratio = (steps if "trim" in label else events) / times[label]
-            judged = "trim" in label or name == "none"
+        if not label.startswith("ours"):
+            ratio = (bare + laid_out) / times[label]
+            judged = label.startswith("C") and name == "none"
             verdict = closed_loop.verdict(ratio <= TIMES_C) if judged else "    "
             print(f"    {verdict}  {ratio:.2f} times {label}" + f" (at most {TIMES_C})" * judged)
-        if label.startswith("JAX"):
-            ratio = times[label] / steps
-            print(
-                f"    {closed_loop.verdict(ratio >= TIMES_JAX)}  {ratio:.1f} times faster than {label} (at least 10)"
-            )
-    print(f"    both cores: {two_cores(fixed):.2f} times as fast as one", flush=True)
+    print(f"    both cores: {two_cores(many):.2f} times as fast as one", flush=True)
 
 
 def least(run: Callable[[], Any]) -> float:
@@ -237,13 +197,13 @@ def least(run: Callable[[], Any]) -> float:
     return min(times)
 
 
-def two_cores(fixed: simd_batch.Lanes) -> float:
+def two_cores(many: batch.Batch) -> float:
     """How much faster two threads are by the clock, the best of five."""
     times: dict[int, float] = {1: np.inf, 2: np.inf}
     for _ in range(5):
         for jobs in times:
             start = time.perf_counter()
-            fixed.run((), jobs)
+            many.run((), jobs)
             times[jobs] = min(times[jobs], time.perf_counter() - start)
     return times[1] / times[2]
 
@@ -257,7 +217,7 @@ def main() -> None:
     parser.add_argument("--spread", type=float, default=0.1, help="of Fs and Fc, as a part of their values")
     parser.add_argument("--error", type=float, default=1e-6, help="in the last position, rad")
     parser.add_argument("--jax", action="store_true", help="compare with JAX (pip install jax)")
-    parser.add_argument("--prototypes", type=Path, metavar="DIR", help="with etd.c and trim.c")
+    parser.add_argument("--prototypes", type=Path, metavar="DIR", help="with etd.c")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         c: dict[str, Any] = {}
@@ -265,10 +225,9 @@ def main() -> None:
         if baseline is not None:
             c["baseline"] = baseline
         if options.prototypes:
-            for compiler, stem in (("gcc", "etd"), ("clang", "trim")):
-                library = built(compiler, options.prototypes / f"{stem}.c", folder)
-                if library is not None:
-                    c[stem] = library
+            library = built("gcc", options.prototypes / "etd.c", folder)
+            if library is not None:
+                c["etd"] = library
         for name in ("none", "GMS feedback"):
             compare(name, options, c)
 

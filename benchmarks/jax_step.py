@@ -1,4 +1,4 @@
-"""The step of the SIMD prototype (trim.c) in JAX: `vmap` over the cases of a `lax.scan` over time, in double precision.
+"""A trapezoid with a fixed step in JAX: `vmap` over the cases of a `lax.scan` over time, in double precision.
 
 The loop of Table 6 on the low reference, with GMS feedback or without. For `benchmarks/batch.py`; pip install jax.
 """

@@ -56,12 +56,12 @@ LONGEST = (
     "rigs/test_ds402", "identify/test_doctor_change", "sweep/test_sweep", "export/test_composed",
     "report/test_thesis_report", "export/test_modelica", "cli/test_identify", "control/test_control_loops",
     "study/test_stability_map", "web/test_sent", "identify/test_exponent", "identify/test_prediction_error",
-    "test_compiled_code", "simulation/test_lanes", "rigs/test_faults",
+    "test_compiled_code", "rigs/test_faults",
 )  # fmt: skip
 
 
-UNAVAILABLE = ("needs a GPU", "needs a machine without a GPU", "needs iec2c")
-"""Reasons to skip that no installation removes: hardware, and matiec (iec2c), which neither Debian nor PyPI has."""
+UNAVAILABLE = ("needs iec2c",)
+"""Reasons to skip that no installation removes: matiec (iec2c), which neither Debian nor PyPI has."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

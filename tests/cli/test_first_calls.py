@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import make_dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -123,11 +124,10 @@ def test_warm_up_compiles_the_loops_that_drives_have(loop, more):
 def test_a_long_sweep_says_how_long_before_it_starts(monkeypatch, capsys):
     monkeypatch.setattr("stickslip.sweep.forecast.paces_of", lambda big: (1.0,))
     monkeypatch.setattr("stickslip.sweep.forecast.seconds_of", lambda big, paces: 36_000.0)
-    sweep.announced(SimpleNamespace(cases=20_000, device="cpu", step=1e-4), 2)
+    many, few = (make_dataclass("Cases", [("cases", int), ("sizes", tuple)])(n, ()) for n in (20_000, 10))
+    assert sweep.announced(many, 2).sizes == (4,)
     assert "20000 closed loops, about 5.0 h on 2 cores; --cases reduces the number" in capsys.readouterr().err
-    sweep.announced(SimpleNamespace(cases=20_000, device="gpu"), 2)
-    assert "20000 closed loops; --cases reduces the number" in capsys.readouterr().err
-    sweep.announced(SimpleNamespace(cases=10, device="cpu"), 2)
+    assert sweep.announced(few, 2) == few
     assert capsys.readouterr().err == ""
 
 

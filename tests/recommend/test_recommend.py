@@ -84,8 +84,10 @@ def test_a_setting_that_is_unsafe_on_an_axis_drawn_later_gives_way(monkeypatch: 
     """Feedforward falls through on the axes drawn for confirmation: feedback is taken, and the table says why."""
     judged = recommending.Bench.judged
 
-    def failing(bench: recommending.Bench, setting: Setting) -> recommending.Candidate:
-        out = judged(bench, setting)
+    def failing(
+        bench: recommending.Bench, setting: Setting, most: float = math.inf
+    ) -> recommending.Candidate:
+        out = judged(bench, setting, most)
         later = len(bench.plants) > 2
         return recommending.Candidate(setting, out.errors, ("rough motion",)) if (
             later and setting.kind == "feedforward"
@@ -110,7 +112,7 @@ def test_the_margin_is_what_is_safe_and_counts_only_what_is_not(
 ) -> None:
     """At 0.9 there is less error than at 0.5, but for the reason `why` it is not taken; at 1.5 everything is rough."""
 
-    def judged(bench: recommending.Bench, setting: Setting) -> recommending.Candidate:
+    def judged(bench: recommending.Bench, setting: Setting, _: float = math.inf) -> recommending.Candidate:
         later = len(bench.plants) > 2
         rough = setting.kind == "feedback" or (setting.gain >= 1.5 and why != "never")
         rough |= why == "unsafe" and later and setting.gain == 0.9

@@ -117,11 +117,15 @@ def test_metrics_leave_every_bit_of_the_motion(compensator):
         assert np.array_equal(metered.velocity, bare.velocity)
 
 
-def test_a_batch_gives_the_same_again_and_in_any_cut():
+def test_a_batch_gives_the_same_again_in_any_cut_and_in_threads():
     many, name = loops(9), "position_rms_rad"
     whole = many.run([name]).metrics[name]
     assert np.array_equal(whole, many.run([name]).metrics[name])
     assert np.array_equal(whole[4:], many[4:].run([name]).metrics[name])
+    one, threads = many.run([name]), many.run([name], jobs=4)
+    assert np.array_equal(whole, threads.metrics[name])
+    for part in ("codes", "time", "position", "velocity"):
+        assert np.array_equal(getattr(one, part), getattr(threads, part))
     assert np.unique(whole).size == 9
 
 

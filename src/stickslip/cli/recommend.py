@@ -15,6 +15,7 @@ never rests is begun and braked smoothly, which is not judged. Sampling is that 
 has a limit cycle on none of these axes; of those within a tenth of the smallest error on the worst axis, it is the one
 with the lowest gain; where friction compensation takes less than a tenth of what the inertia feedforward alone leaves,
 it is that alone. It is then simulated on further sampled axes; the error reduction printed is the one found there.
+A candidate is simulated on more axes only while it can still be the best; the table marks those that were stopped.
 """
 
 from __future__ import annotations

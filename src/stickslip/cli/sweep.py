@@ -49,18 +49,14 @@ def announced(sweep: Sweep, jobs: int) -> Sweep:
 
     if sweep.cases < MANY:
         return sweep
-    told = ""
-    if sweep.device == "cpu":  # What runs elsewhere is not timed here.
-        _output.say("timing some cases ...")
-        paces = paces_of(sweep)
-        seconds = _output.duration(seconds_of(sweep, paces) / jobs)
-        told = f", about {seconds} on {jobs} core{'s' if jobs > 1 else ''}"
-        if sweep.step == 0.0:  # Lanes are filled by whole blocks.
-            sweep = replace(sweep, sizes=tuple(map(block_size, paces)))
+    _output.say("timing some cases ...")
+    paces = paces_of(sweep)
+    seconds = _output.duration(seconds_of(sweep, paces) / jobs)
     _output.tell(
-        f"stickslip: {sweep.cases} closed loops{told}; --cases reduces the number; finished blocks are kept"
+        f"stickslip: {sweep.cases} closed loops, about {seconds} on {jobs} core{'s' if jobs > 1 else ''}; --cases "
+        "reduces the number; finished blocks are kept"
     )
-    return sweep
+    return replace(sweep, sizes=tuple(map(block_size, paces)))
 
 
 def run(args: argparse.Namespace) -> int:

@@ -24,7 +24,7 @@ LANES_ALLOW = {"contract", "arcp", "nsz"}
 
 @functools.lru_cache(maxsize=64)
 def compiled_lanes(text: str) -> Any:
-    """The module of a specialised program of lanes (`stickslip.simulation.many.simd_source`)."""
+    """Return the module of a specialised program of lanes (`stickslip.simulation.recorded_input.segments`)."""
     return loaded(f"lanes_{hashlib.sha256(text.encode()).hexdigest()[:16]}", text)
 
 

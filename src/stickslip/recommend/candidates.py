@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from statistics import median
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
 from stickslip.recommend.candidate_run import Drive, Trial, dangers, rings, run
-from stickslip.recommend.pushed import FINER, swings, swings_on
+from stickslip.recommend.pushed import AfterPushes, swings_on
 from stickslip.recommend.ringing import by_counts, hunting, integral_of, swing_at_rest, within_counts
 from stickslip.recommend.swings import between_counts
 
@@ -131,6 +131,9 @@ class Candidate:
         Why it is not worth it where it is safe; empty where it is.
     refused_as : Setting or None
         The setting with which it was refused at the confirmation, with its lead and the gain tried; None: it was not.
+    finished : bool
+        Whether the verdict is final. False: the remaining axes were not simulated, since the candidate is beaten
+        whatever happens on them; it is neither safe nor unsafe then.
     """
 
     setting: Setting
@@ -138,6 +141,7 @@ class Candidate:
     unsafe: tuple[str, ...]
     useless: str = ""
     refused_as: Setting | None = None
+    finished: bool = True
 
     @property
     def refused(self) -> tuple[str, ...]:
@@ -146,7 +150,7 @@ class Candidate:
 
     @property
     def worst(self) -> float:
-        """The greatest remaining part of the error."""
+        """The greatest remaining part of the error; a lower bound of it while the candidate is not finished."""
         return max(self.errors)
 
     @property
@@ -158,7 +162,7 @@ class Candidate:
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {**asdict(self.setting), "errors": list(self.errors), "unsafe": list(self.unsafe),
-                "useless": self.useless}  # fmt: skip
+                "useless": self.useless, "finished": self.finished}  # fmt: skip
 
 
 class Account:
@@ -186,6 +190,21 @@ class Account:
         self.progress(self.done, self.total)
 
 
+class Moved(NamedTuple):
+    """Result of a setting along the motion on one axis.
+
+    Attributes
+    ----------
+    error : float
+        RMS position error over that of the linear controller alone.
+    unsafe : tuple of str
+        Why the setting is not safe there; empty where it is.
+    """
+
+    error: float
+    unsafe: tuple[str, ...]
+
+
 class Bench:
     """Axes, each with what the linear controller alone does on it, and the laws that may be switched on.
 
@@ -201,8 +220,9 @@ class Bench:
         self.alone: list[Trial | str] = []
         self.left_out: list[RigidAxis] = []
         self.rested: list[float] | None = None
-        self._judged: dict[Setting, Candidate] = {}
-        self._pushed: dict[int, float] = {}
+        self._moved: dict[Setting, dict[int, Moved]] = {}
+        self._swings_on: dict[tuple[Setting, int], bool] = {}
+        self._pushed: dict[int, AfterPushes] = {}
 
     @staticmethod
     def held(
@@ -231,15 +251,19 @@ class Bench:
             self.ran()
         return self.alone[i]
 
-    def trials(self, controller: Controller) -> Iterator[tuple[Trial | str, Trial | str]]:
-        """The linear controller alone and this one, on one axis after the other; some ahead, side by side."""
+    def trials(
+        self, controller: Controller, axes: Sequence[int] | None = None
+    ) -> Iterator[tuple[Trial | str, Trial | str]]:
+        """Run the linear controller alone and this one on one axis after the other (None: on all), some ahead in
+        parallel."""
 
         def both(i: int) -> tuple[Trial | str, Trial | str]:
             plant, known = self.plants[i], i < len(self.alone)
             before = self.alone[i] if known else run(plant, self.linear, self.drive)
             return before, run(plant, controller, self.drive)
 
-        for i, (before, after) in enumerate(in_turn(both, range(len(self.plants)))):
+        axes = range(len(self.plants)) if axes is None else axes
+        for i, (before, after) in zip(axes, in_turn(both, axes), strict=True):
             if i >= len(self.alone):
                 self.alone.append(before)
                 self.ran()
@@ -252,45 +276,68 @@ class Bench:
             if where := rings(plant, self.linear, self.drive, self.before(i)):
                 yield plant, where
 
-    def judged(self, setting: Setting) -> Candidate:
-        """The setting on every axis, up to the first on which it is not safe; simulated once."""
-        if setting not in self._judged:
-            self._judged[setting] = self._judge(setting)
-        return self._judged[setting]
+    def judged(self, setting: Setting, most: float = math.inf) -> Candidate:
+        """Judge the setting on every axis, up to the first on which it is not safe.
 
-    def _judge(self, setting: Setting) -> Candidate:
+        The candidate is left unfinished once more than `most` of the error is left on an axis. A later call goes on
+        from there: nothing is simulated twice.
+        """
         errors: list[float] = []
-        for error, unsafe in self.every(setting):
+        for i, (error, unsafe) in enumerate(self._along_motion(setting)):
             errors.append(error)
-            if unsafe:
+            more = len(errors) < len(self.plants) or setting.kind == "feedback"
+            if not unsafe and max(errors) > most and more:
+                return Candidate(setting, tuple(errors), (), finished=False)
+            if unsafe := unsafe or self._after_a_push(setting, i):
                 return Candidate(setting, tuple(errors), unsafe)
         return Candidate(setting, tuple(errors), (), HARDLY if max(errors) > WORTH else "")
 
     def every(self, setting: Setting) -> Iterator[tuple[float, tuple[str, ...]]]:
         """Yield the part of the error left, and the reasons why the setting is not safe, axis by axis."""
+        for i, (error, unsafe) in enumerate(self._along_motion(setting)):
+            yield error, unsafe or self._after_a_push(setting, i)
+
+    def error_on(self, i: int, setting: Setting) -> float:
+        """Return the part of the error that a setting leaves on axis i."""
+        self.before(i)
+        return next(self._along_motion(setting, [i])).error
+
+    def _along_motion(self, setting: Setting, axes: Sequence[int] | None = None) -> Iterator[Moved]:
+        """Yield the results of a setting along the motion, axis by axis (None: on all); each is simulated once."""
+        known = self._moved.setdefault(setting, {})
+        axes = range(len(self.plants)) if axes is None else axes
         controller = setting.on(self.linear, self.laws[setting.law])
-        for i, (before, after) in enumerate(self.trials(controller)):
-            if isinstance(after, str) or isinstance(before, str):
-                yield math.inf, (why_lost(before, after),)
-                continue
-            unsafe = tuple(dangers(before, after, self.drive, setting.kind == "feedforward"))
-            if not unsafe and setting.kind == "feedback" and self.swings_on(i, controller):
-                unsafe = (AFTER_A_PUSH,)
-            yield after.moving["position_rms_rad"] / before.moving["position_rms_rad"], unsafe
+        runs = self.trials(controller, [i for i in axes if i not in known])
+        for i in axes:
+            if i not in known:
+                known[i] = self._compared(setting, *next(runs))
+            yield known[i]
+
+    def _compared(self, setting: Setting, before: Trial | str, after: Trial | str) -> Moved:
+        """Compare a setting along the motion with the linear controller alone."""
+        if isinstance(after, str) or isinstance(before, str):
+            return Moved(math.inf, (why_lost(before, after),))
+        error = after.moving["position_rms_rad"] / before.moving["position_rms_rad"]
+        return Moved(error, tuple(dangers(before, after, self.drive, setting.kind == "feedforward")))
+
+    def _after_a_push(self, setting: Setting, i: int) -> tuple[str, ...]:
+        """Return why a setting is not safe where axis i is pushed at rest; a feedforward does not react to a push."""
+        if setting.kind != "feedback":
+            return ()
+        if (setting, i) not in self._swings_on:
+            controller = setting.on(self.linear, self.laws[setting.law])
+            self._swings_on[setting, i] = self.swings_on(i, controller)
+        return (AFTER_A_PUSH,) if self._swings_on[setting, i] else ()
 
     def swings_on(self, i: int, controller: Controller) -> bool:
-        """Whether after a push at rest axis i swings on under this controller, and not under the linear one."""
+        """Return whether after a push at rest axis i swings on under this controller, and not under the linear one."""
         plant, before = self.plants[i], self.before(i)
         if not isinstance(before, Trial):
             return False
         least = before.swing(self.drive)
-
-        def alone() -> float:
-            if i not in self._pushed:
-                self._pushed[i] = max(swings(plant, self.linear, self.drive, least, FINER))
-            return self._pushed[i]
-
-        return swings_on(plant, controller, self.drive, least, alone)
+        if i not in self._pushed:
+            self._pushed[i] = AfterPushes(plant, self.linear, self.drive, least)
+        return swings_on(plant, controller, self.drive, least, self._pushed[i])
 
 
 def why_lost(before: Trial | str, after: Trial | str) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -47,28 +49,29 @@ def swing_for_long(controller: Controller, bench: Bench, axis: int, off: float =
     return swing if swing > most else 0.0
 
 
-def swings_for_long(controller: Controller, bench: Bench) -> list[float]:
-    """The wider of both swings on each of the first axes, where the motion ends and beside it, rad."""
+def swings_for_long(controller: Controller, bench: Bench) -> Iterator[float]:
+    """Yield the wider of both swings on each of the first axes, where the motion ends and beside it, rad."""
     axes = [i for i in range(min(ASKED, len(bench.plants))) if isinstance(bench.before(i), Trial)]
     places = [(i, off) for i in axes for off in OFF]
-    swings = list(in_turn(lambda place: swing_for_long(controller, bench, *place), places))
-    return [max(swings[k : k + len(OFF)]) for k in range(0, len(swings), len(OFF))]
+    swings = in_turn(lambda place: swing_for_long(controller, bench, *place), places)
+    for _ in axes:
+        yield max(itertools.islice(swings, len(OFF)))
 
 
 def alone_for_long(bench: Bench) -> list[float]:
-    """The same of the linear controller alone, simulated once; nothing of one without an integral part."""
+    """Return the same of the linear controller alone, simulated once; nothing for one without an integral part."""
     if bench.rested is None:
-        bench.rested = swings_for_long(bench.linear, bench) if integrates(bench.linear) else []
+        bench.rested = list(swings_for_long(bench.linear, bench)) if integrates(bench.linear) else []
     return bench.rested
 
 
 def hunts_with(controller: Controller, bench: Bench) -> str:
-    """That an integral part hunts with a compensator, and not, or by far less, alone; else ""."""
+    """Return that an integral part hunts with a compensator, and not, or by far less, alone; else ""."""
     alone = alone_for_long(bench)
     if not alone:
         return ""
-    widest = max(swings_for_long(controller, bench))
-    return HUNTS if widest > MORE * max(alone) else ""
+    most = MORE * max(alone)
+    return HUNTS if any(swing > most for swing in swings_for_long(controller, bench)) else ""
 
 
 def hunts_alone(bench: Bench, torque: str) -> str:

@@ -8,7 +8,7 @@ its torque later than the motion. So what rests is pushed off the place that it 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -68,8 +68,23 @@ def swings(
     yield from in_turn(after, pushes(plant, drive, shares))
 
 
+class AfterPushes:
+    """Swings of the linear controller alone after pushes on one axis, simulated as far as they are needed."""
+
+    def __init__(self, plant: RigidAxis, linear: Controller, drive: Drive, least: float) -> None:
+        self._found, self._remaining = [0.0], swings(plant, linear, drive, least, FINER)
+
+    def reach(self, swing: float) -> bool:
+        """Return whether `MORE` times the largest of them is at least this swing, rad."""
+        while MORE * max(self._found) < swing:
+            if (further := next(self._remaining, None)) is None:
+                return False
+            self._found.append(further)
+        return True
+
+
 def swings_on(
-    plant: RigidAxis, controller: Controller, drive: Drive, least: float, alone: Callable[[], float]
+    plant: RigidAxis, controller: Controller, drive: Drive, least: float, alone: AfterPushes
 ) -> bool:
-    """Whether after a push it swings on by more than the linear controller does, `alone`, which few cases ask for."""
-    return any(swing > MORE * alone() for swing in swings(plant, controller, drive, least) if swing > 0.0)
+    """Return whether it swings on after a push, by more than `MORE` times as much as the linear controller alone."""
+    return any(not alone.reach(swing) for swing in swings(plant, controller, drive, least) if swing > 0.0)

@@ -287,28 +287,60 @@ class Choice:
 
 
 def picked(settings: Sequence[Setting], bench: Bench, others: Bench, account: Account) -> Choice:
-    """What to switch on: the best that compensates friction, or the inertia feedforward alone where that is as good."""
-    tried: list[Candidate] = []
-    for setting in settings:
-        tried.append(bench.judged(setting))
-        account.tried(len(tried))
-    friction, rejected, unsafe = confirmed([c for c in tried if c.setting.compensates], bench, others)
-    alone, rejected_alone, _ = confirmed([c for c in tried if not c.setting.compensates], bench, others)
-    rejected |= rejected_alone
-    candidates = tuple(rejected.get(c.setting, c) for c in tried)
+    """Choose what to switch on: the best setting that compensates friction, or the inertia feedforward alone if that is
+    as good.
+
+    Every setting is tried on the best estimate. Further axes are simulated only for those that may still be chosen, and
+    for those whose safety is reported (`reported`).
+    """
+    tried = {setting: bench.judged(setting, 0.0) for setting in settings}
+    compensating, without = (
+        {s: c for s, c in tried.items() if s.compensates is kind} for kind in (True, False)
+    )
+    for some in (compensating, without):
+        find_best(some, bench)
+    account.tried(len(tried))
+    friction, unsafe = confirmed(compensating, bench, others)
+    alone, _ = confirmed(without, bench, others)
+    tried |= without | compensating
     # Its errors on the axes of the confirmation, also where it is not to be switched on.
     there = next((others.judged(s) for s in settings if not s.compensates), None) if friction else alone
     if alone and not (friction and adds(friction, alone)):
-        return Choice(alone, candidates, inertia_alone=alone, friction=friction)
+        return Choice(alone, tuple(tried.values()), inertia_alone=alone, friction=friction)
     if friction is None:
-        return Choice(None, candidates)
-    unsafe += [c.setting for c in tried if c.unsafe]
+        return Choice(None, tuple(tried.values()))
+    tried |= {
+        s: bench.judged(s) for s, c in tried.items() if not c.finished and reported(s, friction.setting)
+    }
+    unsafe += [c.setting for c in tried.values() if c.unsafe and c.refused_as is None]
     beyond = [on_both(replace(friction.setting, gain=gain), bench, others) for gain in BEYOND]
     unsafe += [c.setting for c in beyond if c.unsafe]
     guarded = replace(friction.setting, gain=GUARD * friction.setting.gain)  # it was insisted on
     safe = [guarded, *(c.setting for c in beyond if not c.unsafe)]
     margin, unsafe_gain = margin_of(friction.setting, unsafe, safe)
-    return Choice(friction, (*candidates, *beyond), margin, unsafe_gain, there, friction)
+    return Choice(friction, (*tried.values(), *beyond), margin, unsafe_gain, there, friction)
+
+
+def find_best(candidates: dict[Setting, Candidate], bench: Bench) -> Candidate | None:
+    """Return the best of the candidates (`best_of`), and finish in `candidates` those that may be it.
+
+    The error left on the axes so far is a lower bound of the worst one. A candidate whose bound is beyond `NEAR` times
+    the least worst error of a finished one is not the best, whatever its remaining axes give.
+    """
+    while True:
+        least = min((c.worst for c in candidates.values() if c.finished and not c.refused), default=math.inf)
+        possible = [c for c in candidates.values() if not c.finished and c.worst <= NEAR * least]
+        if not possible:
+            return best_of([c for c in candidates.values() if c.finished])
+        setting = min(possible, key=lambda c: c.worst).setting
+        candidates[setting] = bench.judged(setting, NEAR * least)
+
+
+def reported(setting: Setting, chosen: Setting) -> bool:
+    """Whether the safety of a setting is part of the answer: that of higher gains (`margin_of`), and of feedback of all
+    of the friction (`stickslip.recommend.notes`)."""
+    whole = setting.kind == "feedback" and setting.gain == 1.0
+    return whole or (alike(setting, chosen) and setting.gain > chosen.gain)
 
 
 def adds(friction: Candidate, alone: Candidate) -> bool:
@@ -342,24 +374,26 @@ def best_of(
 
 
 def confirmed(
-    candidates: Sequence[Candidate], bench: Bench, others: Bench
-) -> tuple[Candidate | None, dict[Setting, Candidate], list[Setting]]:
-    """The best that is safe on other axes too, with its errors there; those that were not taken; what was not safe."""
-    rejected: dict[Setting, Candidate] = {}
+    candidates: dict[Setting, Candidate], bench: Bench, others: Bench
+) -> tuple[Candidate | None, list[Setting]]:
+    """Return the best candidate that is safe on other axes too, with its errors there, and the settings that are not.
+
+    Those that are refused there are replaced in `candidates` by what they are refused for.
+    """
     unsafe: list[Setting] = []
-    while best := best_of([c for c in candidates if c.setting not in rejected]):
+    while best := find_best(candidates, bench):
         final, where = insisted(with_lead(best, bench).setting, bench, others)
         if not final.refused:
-            return final, rejected, unsafe
+            return final, unsafe
         if final.unsafe:
             unsafe.append(final.setting)
-        rejected[best.setting] = replace(
+        candidates[best.setting] = replace(
             best,
             unsafe=tuple(w + where for w in final.unsafe),
             useless=final.useless,
             refused_as=final.setting,
         )
-    return None, rejected, unsafe
+    return None, unsafe
 
 
 def insisted(setting: Setting, bench: Bench, others: Bench) -> tuple[Candidate, str]:
@@ -390,12 +424,21 @@ def of_more_axes(bench: Bench, others: Bench) -> Bench:
 
 
 def with_lead(candidate: Candidate, bench: Bench) -> Candidate:
-    """The candidate with the lead under which its worst error is least; the shortest of those alike."""
+    """Return the candidate with the lead under which its worst error is least; the shortest of those alike.
+
+    Every lead is tried on the worst axis of the shortest one first. If none is better there, none is better at all.
+    """
     if candidate.setting.kind != "feedforward" or not candidate.setting.compensates:
         return candidate
-    tried = [candidate]
-    for lead in LEADS[1:]:
-        tried.append(bench.judged(replace(candidate.setting, lead=lead * bench.drive.sample_time)))
-    safe = [c for c in tried if not c.unsafe]
-    least = min(c.worst for c in safe)
+    longer = [replace(candidate.setting, lead=n * bench.drive.sample_time) for n in LEADS[1:]]
+    hardest = candidate.errors.index(candidate.worst)
+    if all(candidate.worst <= ALIKE * bench.error_on(hardest, setting) for setting in longer):
+        return candidate
+    safe, least = [candidate], candidate.worst
+    for setting in longer:
+        # Beyond the least worst error, a longer lead is not taken.
+        tried = bench.judged(setting, least)
+        if tried.finished and not tried.unsafe:
+            safe.append(tried)
+            least = min(least, tried.worst)
     return next(c for c in safe if c.worst <= ALIKE * least)

@@ -14,6 +14,8 @@ from stickslip.recommend.course import measured
 from stickslip.recommend.notes import ALLOWANCE
 from stickslip.recommend.recommendation import Recommendation
 
+BEATEN = "not tried further: another one leaves less"
+
 
 def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str]:
     """The setting, what to expect, and what was tried; `unit` turns an angular unit into the axis's own."""
@@ -25,7 +27,7 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
         taken = result.switched_on
         mark = "<- " if taken and (x.label, x.kind, x.gain, x.deadband) == same(taken) else ""
         out.append(f"{x.label:<16}{x.kind:<13}{x.gain:>5.3g}  {x.deadband:>{wide}.3g}  {100 * c.errors[0]:>8.1f} %  "
-              f"{100 * c.worst:>5.1f} %  {mark}{safety(c)}")  # fmt: skip
+              f"{worst_left(c):>7}  {mark}{safety(c)}")  # fmt: skip
     out.append("")
     path, course = result.drive.path, result.drive.course
     speed = f", up to {path.top_speed:.3g} {unit('rad/s')}" if path.top_speed else ""
@@ -143,8 +145,15 @@ def instead_lines(result: Recommendation, taken: Beside) -> list[str]:
     return [f"switch on:         {taken.label}; {said}{other}", *learned]
 
 
+def worst_left(c: Candidate) -> str:
+    """Return the greatest part of the error left on any axis; a dash for a candidate that was not tried on all."""
+    return f"{100 * c.worst:.1f} %" if c.finished else "–"
+
+
 def safety(c: Candidate) -> str:
-    """Whether it is safe; why it is not, or not worth it."""
+    """Return whether a candidate is safe, or why it is not, is not worth it or was not tried further."""
+    if not c.finished:
+        return BEATEN
     if c.unsafe:
         return f"no: {', '.join(c.unsafe)}"
     return f"yes, but {c.useless}" if c.useless else "yes"

@@ -21,7 +21,6 @@ from typing import Any
 from stickslip.capacity import insist_on_jobs, insist_on_memory
 from stickslip.errors import InputError
 from stickslip.identify.estimate import silent
-from stickslip.simulation.many import simd_batch
 from stickslip.study.files import claim_folder, save_manifest
 from stickslip.study.study import interrupts_between_runs
 from stickslip.sweep import dataset
@@ -83,8 +82,7 @@ def run(
     Raises
     ------
     InputError
-        If the folder or the scheduler cannot be used, there is no GPU and one is asked for, or workers are killed
-        again and again.
+        If the folder or the scheduler cannot be used, or workers are killed again and again.
     """
     say = say or silent
     progress = progress or _unseen
@@ -140,14 +138,12 @@ def ready(sweep: Sweep, scheduler: str = "") -> None:
     Raises
     ------
     InputError
-        If a run is bad, the scheduler's address is none, or a GPU is needed and this machine, which runs it, has none.
+        If a run is bad, or the scheduler's address is none.
     """
     if scheduler and not ADDRESS.fullmatch(scheduler):
         raise InputError(
             f"--scheduler {scheduler!r} is no address of a Dask scheduler; give one such as tcp://host:8786"
         )
-    if sweep.device == "gpu" and not scheduler:
-        simd_batch.check_gpu()
     loops = len(sweep.runs) * sweep.drawn.cases
     insist_on_memory(loops / BLOCK * BOOKED, f"{loops:.3g} closed loops in blocks of {BLOCK}", "run fewer")
     for planned in sweep.runs:
@@ -156,14 +152,13 @@ def ready(sweep: Sweep, scheduler: str = "") -> None:
 
 def departures(sweep: Sweep, integrators: Sequence[tuple[str, str]]) -> list[str]:
     """A line for every reason why runs are not integrated by what comes first."""
-    wanted = "in lanes" if sweep.step > 0.0 else "exactly"
     groups: dict[tuple[str, str], list[str]] = {}
     for planned, (name, why) in zip(sweep.runs, integrators):
         if why:
             groups.setdefault((name, why), []).append(planned.key)
     return [
         f"{', '.join(keys[:3])}{f' and {len(keys) - 3} more' if len(keys) > 3 else ''}:"
-        f" integrator {name}, not {wanted}: {why}"
+        f" integrator {name}, not exactly: {why}"
         for (name, why), keys in groups.items()
     ]
 

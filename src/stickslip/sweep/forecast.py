@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stickslip.sweep.block import compute_cases, integrator_of
-from stickslip.sweep.plan import BLOCK, GPU_BLOCK, Sweep
+from stickslip.sweep.block import compute_cases
+from stickslip.sweep.plan import BLOCK, Sweep
 
 MOST_TIMED, SHARE = 16, 0.05
 """Cases timed of every run, at most, and as part of all that it has."""
@@ -46,15 +46,8 @@ def block_size(pace: float) -> int:
     return max(1, min(BLOCK, 2 ** math.floor(math.log2(IN_HAND / pace)))) if pace > 0.0 else BLOCK
 
 
-def at_once(sweep: Sweep) -> int:
-    """Cases that fill the device which runs the lanes."""
-    return GPU_BLOCK if sweep.device == "gpu" else BLOCK
-
-
 def size_timed(sweep: Sweep, run: int) -> int:
-    """The same of a run that nobody has timed, from a single case of it; lanes are filled by whole blocks."""
-    if integrator_of(sweep, run)[0] == "lanes":
-        return at_once(sweep)
+    """Return the same for a run that was not timed, from a single case of it."""
     _timed(sweep, run, [0])  # It compiles.
     return block_size(_timed(sweep, run, [sweep.drawn.cases // 2]))
 
@@ -62,16 +55,12 @@ def size_timed(sweep: Sweep, run: int) -> int:
 def _pace_of(sweep: Sweep, run: int, patience: float) -> float:
     """Of one run."""
     cases = sweep.drawn.cases
-    if integrator_of(sweep, run)[0] == "lanes":
-        # Lanes are filled by whole blocks.
-        chunk = most = min(at_once(sweep), cases)
-    else:
-        chunk, most = CHUNK, min(MOST_TIMED, max(CHUNK, int(SHARE * cases)))
+    most = min(MOST_TIMED, max(CHUNK, int(SHARE * cases)))
     spent, timed = 0.0, 0
     _timed(sweep, run, [0])  # It compiles.
     while timed < most and spent < patience:
-        spent += _timed(sweep, run, [int(cases * (GOLDEN * (timed + i) % 1.0)) for i in range(chunk)])
-        timed += chunk
+        spent += _timed(sweep, run, [int(cases * (GOLDEN * (timed + i) % 1.0)) for i in range(CHUNK)])
+        timed += CHUNK
     return spent / timed
 
 

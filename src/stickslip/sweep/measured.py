@@ -59,7 +59,7 @@ def measured(
     else:
         many.parameters[:, case_arrays.PERTURBATION] = perturbation
         results = many.run(metrics)
-        found = read_results(results, metrics, "exact")
+        found = _read(results, metrics)
         goes_on = planned.numerics.integrator == "auto" and perturbation == 0.0
         left = [i for i in range(n) if goes_on and results.codes[i] in NO_STEPS]
     for i in left:
@@ -69,11 +69,11 @@ def measured(
     return found
 
 
-def read_results(results: batch.Results, metrics: Sequence[str], integrator: str) -> Measured:
-    """What a batch gave, by the names of the metrics."""
+def _read(results: batch.Results, metrics: Sequence[str]) -> Measured:
+    """Return what a batch gave, its metrics in this order."""
     found = np.column_stack([results.metrics[name] for name in metrics])
     failures = [_reason(int(code), float(t)) for code, t in zip(results.codes, results.time)]
-    return Measured(found, failures, [integrator] * len(failures))
+    return Measured(found, failures, ["exact"] * len(failures))
 
 
 def _reason(code: int, time: float) -> str:

@@ -15,7 +15,6 @@ from stickslip.config import Table, read_toml
 from stickslip.errors import ConfigError, suggestion
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified, identified_in, read_identified
-from stickslip.simulation.many import simd_batch
 from stickslip.simulation.metrics import METRICS
 from stickslip.study import plan as studies
 from stickslip.study.plan import Study
@@ -28,8 +27,8 @@ from stickslip.sweep.sample import LEVEL, METHODS, Drawn, Spread, count_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 BUILT_IN = ("thesis-robustness", "thesis-gain")
-BLOCK, GPU_BLOCK = 256, 16_384
-"""Cases in a file of the data set, at most, and where a GPU runs lanes: it is not filled by fewer."""
+BLOCK = 256
+"""Cases in a file of the data set, at most."""
 USUAL = ("position_rms_rad", "position_peak_rad", "velocity_rms_rad_s", "torque_rms_Nm")
 MADE_BY = ("block.py", "measured.py", "metric_check.py")
 """What the numbers of a case come from, besides the engine."""
@@ -51,7 +50,7 @@ class Sweep:
     metrics : tuple of str
     check : bool
         Whether every case is run again, with wrong steps or tighter, to flag those whose metrics are not sure
-        (`stickslip.sweep.metric_check`); in lanes with twice the step.
+        (`stickslip.sweep.metric_check`).
     study : Study
     config : mapping
         The sweep's TOML as read.
@@ -60,10 +59,6 @@ class Sweep:
         Files it refers to, by the path as written.
     tuned, percentile
         What `stickslip.sweep.tune` may choose, and the percentile over the cases that it judges by.
-    step : float
-        Of lanes, s (`stickslip.simulation.many.simd_batch`); 0 runs every case exactly.
-    device : {"cpu", "gpu"}
-        Where lanes run.
     left_out : tuple of str
         Estimates of the model that do not vary: they are not parameters of its law.
     sizes : tuple of int
@@ -82,8 +77,6 @@ class Sweep:
     files: Mapping[str, Path]
     tuned: tuple[Spread, ...] = ()
     percentile: float = 95.0
-    step: float = 0.0
-    device: str = "cpu"
     left_out: tuple[str, ...] = ()
     sizes: tuple[int, ...] = ()
 
@@ -108,8 +101,6 @@ class Sweep:
             self.runs[run].fingerprint, asdict(self.drawn), self.metrics, self.check,
             *(file_hash(Path(__file__).with_name(name)) for name in MADE_BY),
         ]  # fmt: skip
-        if self.step > 0.0:
-            content += [self.step, self.device]
         return hashlib.sha256(json.dumps(content, sort_keys=True, default=repr).encode()).hexdigest()
 
     def places(self, run: PlannedRun) -> dict[str, int]:
@@ -189,14 +180,13 @@ def _sweep(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Sw
             f"{table.label('tune')}: {min(both)} varies too ([vary]); a number is either chosen or uncertain: leave "
             "it out of one of them"
         )
-    step, device = _lanes(table, metrics)
     title = table.text("title", _title(name, study, drawn, tuned))
     percentile = table.positive("percentile", "%", 95.0) if tuned else 95.0
     if percentile > 100.0:
         raise table.error("percentile", "must be at most 100 %")
     found = Sweep(
         name, title, runs, drawn, tuple(metrics), check, study, table.values, path, dict(table.document.files),
-        tuple(tuned), percentile, step, device, left_out,
+        tuple(tuned), percentile, left_out,
     )  # fmt: skip
     check_numbers(found, table)
     return found
@@ -211,19 +201,6 @@ def _title(name: str, study: Study, drawn: Drawn, tuned: Sequence[Spread]) -> st
     varied = f"{counted(sum(n != LEVEL for n in drawn.names), 'parameter')} of study {study.name} varied"
     own = f"{counted(len(tuned), 'setting')} tuned, " if tuned else ""
     return f"{name}: {own}{varied}"
-
-
-def _lanes(table: Table, metrics: Sequence[str]) -> tuple[float, str]:
-    """Step and device of ``integrator = "lanes"``; no step where every case is run exactly."""
-    if table.choice("integrator", ("exact", "lanes"), "exact") == "exact":
-        return 0.0, "cpu"
-    unknown = [name for name in metrics if name not in simd_batch.METRICS]
-    if unknown:
-        raise table.error(
-            "metrics", f"has {unknown[0]!r}, which lanes do not measure; choose integrator exact"
-        )
-    device = table.choice("device", simd_batch.DEVICES, "cpu")
-    return table.positive("time_step", "s", simd_batch.STEP), device
 
 
 def _study(name: str, path: Path, table: Table, moved: Mapping[str, Path]) -> Study:

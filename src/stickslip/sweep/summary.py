@@ -27,11 +27,6 @@ def meaning_of_flags(sweep: Sweep) -> str:
     """What it says of a case that it is flagged, and what was run to find out."""
     if not sweep.check:
         return "nothing: no case was run again (check = false)"
-    if sweep.step > 0.0:
-        return (
-            "twice the time step changes a metric by more than 0.3 %: every case was run again so, and the motion of "
-            "these hangs on details that nobody knows"
-        )
     return (
         "every case was run again with other errors of its steps (check), and a metric of these changes by more than "
         "0.1 %: their motion hangs on details that nobody knows, and each is one of many that could be"

@@ -71,7 +71,8 @@ def recommend(
 
     Candidates are simulated on the best estimate and on axes drawn from the model's intervals, along the motion of the
     log and at rest behind it, sampled as in the drive. Recommended is what limit-cycles on none of them and leaves the
-    least error on the worst; then it is simulated on other axes sampled from the intervals.
+    least error on the worst; then it is simulated on other axes sampled from the intervals. A candidate is simulated on
+    more axes only while it can still be the best.
 
     Parameters
     ----------

@@ -23,6 +23,7 @@ from stickslip.report.recommendation_text import (
     reduction,
     safety,
     without_friction,
+    worst_left,
 )
 from stickslip.verbs import own_files
 from stickslip.whole_files import prepared_folder
@@ -99,7 +100,7 @@ class RecommendationResult:
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """All that was tried."""
+        """All that was tried; those that were beaten early are not finished (`Candidate.finished`)."""
         return self.recommendation.candidates
 
     @property
@@ -173,7 +174,7 @@ def _row(c: Candidate) -> str:
         x.kind,
         f"{x.gain:g}",
         f"{100 * c.errors[0]:.1f} %",
-        f"{100 * c.worst:.1f} %",
+        worst_left(c),
         safety(c),
     )
     return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"

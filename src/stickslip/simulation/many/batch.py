@@ -7,7 +7,9 @@ loop is what `stickslip.simulate(..., integrator="exact")` would run.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -54,8 +56,6 @@ class Results:
         Where it ended, s, rad, rad/s.
     metrics : mapping of str to array, shape (n,)
         NaN where there is none; empty if none was asked for.
-    unresolved : array of int, shape (n,)
-        Steps with more switches than were followed; only in lanes, the exact integrator follows all.
     """
 
     codes: np.ndarray[Any, np.dtype[np.int64]]
@@ -63,7 +63,6 @@ class Results:
     position: Array
     velocity: Array
     metrics: Mapping[str, Array]
-    unresolved: np.ndarray[Any, np.dtype[np.int64]]
 
 
 @dataclass(frozen=True)
@@ -86,14 +85,16 @@ class Batch:
             self, parameters=self.parameters[some], plans=self.plans[some], starts=self.starts[some]
         )
 
-    def run(self, metrics: Sequence[str] = METRICS) -> Results:
+    def run(self, metrics: Sequence[str] = METRICS, jobs: int = 1) -> Results:
         """Run all of them.
 
         Parameters
         ----------
         metrics : sequence of str
-            Those wanted. Where `stickslip.simulation.metrics.COARSE` has all of them, nothing is counted, which is
+            Those requested. If `stickslip.simulation.metrics.COARSE` has all of them, nothing is counted, which is
             a little faster. None at all is the fastest.
+        jobs : int
+            Threads; each runs a part of the loops by the same kernel, so the results do not depend on their number.
 
         Raises
         ------
@@ -103,6 +104,14 @@ class Batch:
         for name in metrics:
             if name not in METRICS:
                 raise UnknownName("metric", name, METRICS)
+        if jobs > 1 and len(self) > 1:
+            size = max(1, math.ceil(len(self) / jobs))
+
+            def part(first: int) -> Results:
+                return self[first : first + size].run(metrics)
+
+            with ThreadPoolExecutor(jobs) as pool:
+                return _joined(list(pool.map(part, range(0, len(self), size))))
         n, duration = len(self), float(self.case.numbers[DURATION])
         coarse = all(name in COARSE for name in metrics)
         band = settle_band_of(self.case.reference, duration)
@@ -117,7 +126,18 @@ class Batch:
         found = columns(accs, cycles[:, 0], cycles[:, 1])
         ran = codes == case_arrays.DONE
         wanted = {name: np.where(ran, found[name], np.nan) for name in metrics}
-        return Results(codes, ends[:, 0], ends[:, 1], ends[:, 2], wanted, np.zeros(n, dtype=np.int64))
+        return Results(codes, ends[:, 0], ends[:, 1], ends[:, 2], wanted)
+
+
+def _joined(parts: Sequence[Results]) -> Results:
+    """Join the results of consecutive parts of a batch."""
+    codes, time, position, velocity = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("codes", "time", "position", "velocity")
+    )
+    names = parts[0].metrics
+    metrics = {name: np.concatenate([part.metrics[name] for part in parts]) for name in names}
+    return Results(codes, time, position, velocity, metrics)
 
 
 def refusal(case: Case, names: Sequence[str]) -> str:

@@ -8,18 +8,19 @@ written so, and axes with backlash, a pendulum or harmonics, are left to `record
 
 from __future__ import annotations
 
+import ast
 import functools
 import math
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from stickslip.jit import compiled_lanes, flat
 from stickslip.simulation import root
-from stickslip.simulation.many.simd_source import body
 from stickslip.simulation.recorded_input import simd_batch
 from stickslip.simulation.recorded_input.branchless import Assumption, Name, NotStraight, Trace, traced
 from stickslip.simulation.recorded_input.simd_batch import Numbers
@@ -97,12 +98,37 @@ def source(law: Law, trace: Trace) -> str:
         "from stickslip.jit import pointer, record_at, select",
         f"LANES, STATES, HOLDS = {LANES}, {count}, {law.holding is not None}",
     ]
-    constants, functions = body(("recorded_input/simd_batch",), INLINED)
+    constants, functions = engine_text()
     text += constants
     text += written(law, "step", {"v0": Name("v"), "v1": Name("v"), "dt": Name("h")}, "law", "v, h", trace)
     if law.holding is not None:
         text += written(law, "holding", {"direction": Name("direction")}, "withstood", "direction", trace)
     return "\n".join([*text, *root_finder(), *functions]) + "\n"
+
+
+@functools.cache
+def engine_text() -> tuple[list[str], list[str]]:
+    """Return the constants and the functions of `recorded_input.simd_batch`; those `INLINED` run for all lanes at
+    once."""
+    text = Path(simd_batch.__file__).read_text(encoding="utf-8")
+    tree = ast.parse(text.partition("from __future__ import annotations")[2])
+    constants = [ast.unparse(node) for node in tree.body if isinstance(node, ast.Assign)]
+    functions: list[str] = []
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef):
+            functions.append("@compile_inlined" if node.name in INLINED else "@compile_lanes")
+            functions.append(ast.unparse(bare(node)))
+    return constants, functions
+
+
+def bare(node: ast.FunctionDef) -> ast.FunctionDef:
+    """Return a function without its docstring and annotations."""
+    for argument in node.args.args:
+        argument.annotation = None
+    node.returns = None
+    if isinstance(node.body[0], ast.Expr):
+        node.body = node.body[1:]
+    return node
 
 
 @functools.cache

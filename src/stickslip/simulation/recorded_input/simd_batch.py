@@ -3,8 +3,8 @@
 The step of `recorded_input.step` in the loop of `recorded_input.loop`, for a torque that is held and without what
 depends on the position. All lanes iterate until the last has solved its stage; those that have keep their velocity.
 Nothing branches on what differs between lanes, so that the compiler runs 4 or 8 of them at once
-(`docs/decisions/0015-lanes.md` says what that takes). ``w`` is a lane (`LANE`), ``n`` are the numbers of axis and
-observer, ``p`` the law's, which all share.
+(`docs/decisions/0017-the-observer-in-stretches.md` says what that takes). ``w`` is a lane (`LANE`), ``n`` are the
+numbers of axis and observer, ``p`` the law's, which all share.
 """
 
 from __future__ import annotations

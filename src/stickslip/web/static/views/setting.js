@@ -49,10 +49,10 @@ function headline(found) {
 function candidates(found) {
   const percent = (v) => (v === null || v === undefined ? "unknown" : `${(100 * v).toFixed(1)} %`);
   const same = (c) => found.chosen && ["law", "kind", "gain", "lead", "deadband"].every((k) => c[k] === found.chosen[k]);
-  return h("section", {}, h("h2", {}, "All that was tried"), h("p", { class: "hint" }, `Each on ${found.axes} axes that the data allow; errors beside the linear controller's alone.`),
+  return h("section", {}, h("h2", {}, "All that was tried"), h("p", { class: "hint" }, `On up to ${found.axes} axes that the data allow; errors relative to the linear controller alone.`),
     h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Candidates" }, h("table", {}, h("thead", {}, h("tr", {}, ["law", "structure", "gain", `deadband (${unitOf(found, "velocity") || "rad/s"})`, "error left", "worst", "safe, and why not"].map((t) => h("th", { scope: "col" }, t)))),
       h("tbody", {}, found.candidates.map((c) => h("tr", { class: same(c) ? "chosen" : "" }, h("th", { scope: "row" }, (c.gain === 0 ? "inertia alone" : c.law) + (same(c) ? " (recommended)" : "")), h("td", {}, c.kind), h("td", {}, number(c.gain)), h("td", {}, number(c.deadband)),
-        h("td", {}, percent(c.errors[0])), h("td", {}, percent(Math.max(...c.errors))), h("td", { class: c.unsafe.length ? "bad text" : "good" }, c.unsafe.length ? `no: ${c.unsafe.join(", ")}` : c.useless ? `yes, but ${c.useless}` : "yes")))))));
+        h("td", {}, percent(c.errors[0])), h("td", {}, c.finished === false ? "–" : percent(Math.max(...c.errors))), h("td", { class: c.unsafe.length ? "bad text" : c.finished === false ? "" : "good" }, c.finished === false ? "not tried further: another one leaves less" : c.unsafe.length ? `no: ${c.unsafe.join(", ")}` : c.useless ? `yes, but ${c.useless}` : "yes")))))));
 }
 
 function download(setting, targets) {
