@@ -149,6 +149,12 @@ class SlidingPosterior:
         """Probability that an alternative is present."""
         return float(sum(m.weight for m in self.members if name in m.on))
 
+    @property
+    def compliance(self) -> str:
+        """The likeliest alternative in which motor and load do not move as one; "" where none is likely."""
+        likely = [n for n, a in self.alternatives.items() if a.compliant and self.presence(n) > PRESENT]
+        return max(likely, key=self.presence, default="")
+
     def explains(self, number: str) -> tuple[str, float]:
         """The alternative that widens a number most, and its part of the variance; "" where none does.
 

@@ -36,7 +36,7 @@ from stickslip.identify.fit.jackknife import leave_blocks_out
 from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parallel import mapped
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
-from stickslip.identify.fit.sample_rate_limit import unresolved_refused, unseen_refused
+from stickslip.identify.fit.sample_rate_limit import of_presliding, unresolved_refused, unseen_refused
 from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.fit.uncertainty import interval_of, verdict_on
 from stickslip.identify.observer.innovations import (
@@ -68,6 +68,8 @@ UNMODELLED = 3.0
 observer): chosen by coverage on 51 simulated logs (`benchmarks/ordinary_logs.py`, seeds 8200000, every 13th cell)."""
 DELAY_PRIOR = 0.6
 """Rows, as of sliding: where no sliding tells the delay."""
+SURE = 0.95
+"""Probability from which on friction is taken to fall with velocity."""
 ALIKE = 1e-3
 """Part of friction by which any law's steady torque may be off."""
 
@@ -340,10 +342,31 @@ def fit_law(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any]
         model = model_at(law, vector, u)
     highest = max(float(np.max(np.abs(m.seen.velocity))) for m in seen.motions)
     period, own = max(m.period for m in seen.motions), model.parameters
-    estimates = [e for e in found if e.name != DELAY]
+    estimates: Sequence[Estimate] = [e for e in found if e.name != DELAY]
     estimates = unseen_refused(estimates, law, own, vector.named(u)["inertia"], highest, period)
     estimates = unresolved_refused(estimates, law, own, evidence.experiments, level)
-    return LawFit(vector, u, covariance, model, estimates, contradiction, tuple(criterion.corrections(u)))
+    if evidence.sliding is not None and evidence.sliding.compliance:
+        estimates = compliant_refused(estimates, model, evidence.sliding)
+    return LawFit(
+        vector, u, covariance, model, tuple(estimates), contradiction, tuple(criterion.corrections(u))
+    )
+
+
+def compliant_refused(
+    estimates: Sequence[Estimate], model: Model, sliding: SlidingPosterior
+) -> list[Estimate]:
+    """The estimates, those of pre-sliding refused where motor and load do not move as one."""
+    cause = sliding.compliance
+    what, p = sliding.alternatives[cause].cause, sliding.presence(cause)
+    why = (
+        f"only reversals determine it, and there {what} yields as well (present with a probability of {100.0 * p:.0f} "
+        "%); record slow reversals with a sensor at the load"
+    )
+    own = (model.law, model.parameters)
+    return [
+        replace(e, identified=False, verdict=why, cause=cause, share=p)
+        if e.identified and of_presliding(*own, e.name, sliding.speeds) else e for e in estimates
+    ]  # fmt: skip
 
 
 def model_at(law: Law, vector: Vector, u: Array) -> Model:
@@ -451,6 +474,13 @@ def beside_sliding(e: Estimate, p: Parameter, sliding: SlidingPosterior, level: 
     other = sliding.numbers[p.name]
     if not (e.value > 0.0 and e.lower > 0.0 and other.value > 0.0 and other.lower > 0.0):
         return e
+    if sliding.compliance:
+        # Reversals then show the spring or the gap as well.
+        found = judged(p, other.value, other.lower, other.upper, level)
+        if sliding.falls >= SURE:
+            return found
+        why = f"friction falls with velocity within the recorded speeds with a probability of {sliding.falls:.2g} only"
+        return replace(found, identified=False, verdict=why)
     own = math.log(e.upper / e.lower) / (2.0 * QUANTILE)
     theirs = math.log(other.upper / other.lower) / (2.0 * QUANTILE)
     # Of a fall that may be none at all its velocity says as much less.

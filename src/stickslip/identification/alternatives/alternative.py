@@ -53,6 +53,9 @@ class Alternative:
         Whether `SlidingRows.see` alone makes the columns: their torque can be taken out of a record.
     shape : callable, optional
         ``shape(level, k)``: standard deviations of the k coefficients at one level.
+    compliant : bool
+        Whether motor and load then do not move as one: what reversals alone show of a contact is then the spring's or
+        the gap's as well.
     wave_number : float
         rad⁻¹ (m⁻¹) of a torque that repeats over the position; 0 of others.
     cause : str
@@ -72,6 +75,7 @@ class Alternative:
     curve: Callable[[Array, SlidingRows], Array] | None = None
     removable: bool = False
     shape: Callable[[Any, int], Array] | None = None
+    compliant: bool = False
     wave_number: float = 0.0
     cause: str = ""
     remedy: str = ""

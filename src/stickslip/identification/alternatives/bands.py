@@ -34,7 +34,7 @@ def usual(rows: SlidingRows) -> Array:
 ALTERNATIVES = (
     Alternative(
         "inertia by frequency", lambda rows: (rows.acceleration * rows.band)[:, None], "inertia",
-        absent=0.001, present=(0.02, 0.2), odds=0.2, splits="inertia",
+        absent=0.001, present=(0.02, 0.2), odds=0.2, splits="inertia", compliant=True,
         cause="an inertia that differs with frequency", remedy=REMEDY,
     ),
     Alternative(
@@ -42,7 +42,7 @@ ALTERNATIVES = (
         absent=0.002, present=(0.01,), cause="a torque in step with the acceleration", remedy=REMEDY,
     ),
     Alternative(
-        "no single inertia", coupled, present=(0.01, 0.1),
+        "no single inertia", coupled, present=(0.01, 0.1), compliant=True,
         cause="motor and load that do not move as one", remedy=REMEDY,
     ),
     Alternative(

@@ -28,12 +28,12 @@ def fourth(rows: SlidingRows) -> Array:
 
 ALTERNATIVES = (
     Alternative(
-        "elasticity", second, "inertia", absent=0.5, present=(100.0,), odds=0.2,
+        "elasticity", second, "inertia", absent=0.5, present=(100.0,), odds=0.2, compliant=True,
         cause="a load behind a spring, or a filter in the torque column",
         remedy="record gentler accelerations, and the torque unfiltered",
     ),
     Alternative(
-        "elasticity of higher order", fourth, "inertia", absent=0.1, present=(200.0,), odds=0.02,
+        "elasticity of higher order", fourth, "inertia", absent=0.1, present=(200.0,), odds=0.02, compliant=True,
         cause="a load that swings", remedy="record gentler accelerations",
     ),
 )  # fmt: skip

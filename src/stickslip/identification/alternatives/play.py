@@ -28,7 +28,7 @@ def in_the_gap(record: SlidingRecord) -> Array:
 
 ALTERNATIVES = (
     Alternative(
-        "play", lambda rows: rows.see(in_the_gap), "inertia", absent=0.002, present=(0.3,), odds=0.2,
+        "play", lambda rows: rows.see(in_the_gap), "inertia", absent=0.002, present=(0.3,), odds=0.2, compliant=True,
         cause="backlash", remedy="record moves at constant speed with gentle ramps, which keep the play closed",
     ),
 )  # fmt: skip
