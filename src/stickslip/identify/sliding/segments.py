@@ -208,7 +208,7 @@ def sliding_points(
     Returns
     -------
     points : SlidingPoints
-        Weighted by their standard deviations where every segment has one; ``largest`` is the records' largest torque.
+        Weighted by their standard deviations where every segment has one.
     notes : tuple of str
         What was averaged, what was dropped and why, and what was less than a revolution.
 
@@ -233,10 +233,9 @@ def sliding_points(
         raise InputError(f"{_none_found(dropped)}{table}")
     std = np.array([s.std for s in segments])
     usable = bool(np.all(np.isfinite(std) & (std > 0.0)))
-    largest = max(float(np.max(np.abs(r[torque]))) for r in several)
     points = SlidingPoints(
         np.array([s.velocity for s in segments]), np.array([s.torque for s in segments]), std if usable else None,
-        largest=largest, absolute=usable,
+        absolute=usable,
     )  # fmt: skip
     return points, tuple(_notes(segments, dropped, stuck, torque, linear=several[0].units["position"] == "m"))
 
