@@ -1,11 +1,13 @@
 """Pre-sliding loops, lag in sliding, and any law along a measured motion: the thesis's numbers on its own friction."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from stickslip import Model, Reference, respond
+from stickslip.cli import main
 from stickslip.errors import InputError
 from stickslip.identify.presliding.attraction import identify_attraction, largest_without_overshoot
 from stickslip.identify.presliding.hysteresis import (
@@ -21,9 +23,10 @@ from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.presliding import Presliding
 from stickslip.rigs.virtual import VirtualRig
 from stickslip.simulation.prescribed.motion import Along
-from support.places import DATA, needs_data
+from support.places import DATA, REFERENCE, needs_data, needs_reference
 
 SLIDING = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
+CURVE = Model("stribeck_plain", **SLIDING)
 PLANT = Model("gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, **SLIDING)
 
 
@@ -35,7 +38,7 @@ def loop() -> Loop:
 
 
 def test_table_5_stiffness_within_2_percent(loop: Loop) -> None:
-    result = identify_presliding(loop, SLIDING, elements=3, shares="equal")
+    result = identify_presliding(loop, CURVE, elements=3, shares="equal")
     found = [result[f"k[{i}]"].value for i in range(3)]
     assert found == pytest.approx([12896.0, 8141.0, 4273.0], rel=0.02)
     assert found == pytest.approx([12707.0, 8084.0, 4296.0], rel=0.002)  # the reference's least squares
@@ -43,8 +46,26 @@ def test_table_5_stiffness_within_2_percent(loop: Loop) -> None:
     assert result.misfit["held_out_relative"] < 0.02
 
 
+@needs_reference("identification.json")
+def test_table_5_by_command(loop: Loop, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = (
+        f"{t!r},{x!r},{y!r}"
+        for t, x, y in zip(loop.time.tolist(), loop.position.tolist(), loop.torque.tolist(), strict=True)
+    )
+    log = tmp_path / "loop.csv"
+    log.write_text("\n".join(["time [s],position [rad],torque [Nm]", *rows]))
+    curve = [word for name, value in SLIDING.items() for word in ("--set", f"{name}={value}")]
+    command = ["identify", str(log), "--method", "presliding", "--elements", "3", "--shares", "equal", *curve]
+    assert main([*command, "--json", "--no-report", "--out", str(tmp_path / "m.toml")]) == 0
+    found = json.loads(capsys.readouterr().out)
+    expected = json.loads((REFERENCE / "identification.json").read_text())["hysteresis"]["k"]
+    values = {e["name"]: e["value"] for e in found["estimates"]}
+    assert [values[f"k[{i}]"] for i in range(3)] == pytest.approx(expected, rel=1e-3)
+    assert Model.from_file(tmp_path / "m.toml").parameters.alpha == pytest.approx([1 / 3] * 3)
+
+
 def test_as_many_elements_as_the_plant_has_are_found_and_exact(loop: Loop) -> None:
-    result = identify_presliding(loop, SLIDING, noise=1e-4)
+    result = identify_presliding(loop, CURVE, noise=1e-4)
     assert result.details["elements"] == 4
     assert [result[f"k[{i}]"].value for i in range(4)] == pytest.approx([1e4, 7e3, 5e3, 3e3], rel=1e-4)
     assert [result[f"alpha[{i}]"].value for i in range(4)] == pytest.approx([0.25] * 4, rel=1e-4)
@@ -57,7 +78,7 @@ def test_as_many_elements_as_the_plant_has_are_found_and_exact(loop: Loop) -> No
 def test_noisy_loop_of_the_wrong_sign_with_an_offset(loop: Loop) -> None:
     torque = -(loop.torque + 0.02 + np.random.default_rng(0).normal(0.0, 2e-3, loop.torque.size))
     noisy = Loop(loop.time, loop.position, torque, loop.unit, loop.velocity)
-    result = identify_presliding(noisy, SLIDING, elements=4, shares="equal", offset=True)
+    result = identify_presliding(noisy, CURVE, elements=4, shares="equal", offset=True)
     assert "sign was changed" in result.notes[0]
     assert result["offset"].value == pytest.approx(-0.02 * -1.0, abs=2e-3)
     assert [result[f"k[{i}]"].value for i in range(4)] == pytest.approx([1e4, 7e3, 5e3, 3e3], rel=0.15)
@@ -67,9 +88,9 @@ def test_cycles_leave_out_the_transient(loop: Loop) -> None:
     found = cycles(loop.position)
     assert [round(float(loop.time[c[0]]), 2) for c in found] == [6.25, 11.25]
     with pytest.raises(InputError, match="no full cycle"):
-        identify_presliding(Loop(loop.time, loop.time, loop.torque), SLIDING)
+        identify_presliding(Loop(loop.time, loop.time, loop.torque), CURVE)
     with pytest.raises(InputError, match="'free' or 'equal'"):
-        identify_presliding(loop, SLIDING, shares="some")
+        identify_presliding(loop, CURVE, shares="some")
 
 
 @pytest.mark.parametrize(
@@ -83,7 +104,7 @@ def test_the_stiffness_of_a_loop_does_not_depend_on_its_frequency(name: str, fre
     """The torque's lag behind the motion is no infinitely stiff element."""
     m = machine(name)
     record = perform(Presliding(amplitude=0.13, frequency=frequency), VirtualRig(m)).record
-    level = {"fs": 0.3, "fc": 0.3, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.0}
+    level = Model("stribeck_plain", fs=0.3, fc=0.3, vs=0.01)
     found = identify_presliding(
         Loop.of(record, "motor_torque"), level, elements=3, offset=True, inertia=m.inertia
     )
@@ -98,7 +119,7 @@ def test_what_accelerates_the_inertia_is_no_spring() -> None:
     truth = Model("gms", k=[240.0, 160.0], alpha=[0.2, 0.8], c=90.0, **(SLIDING | {"fs": 0.3, "fc": 0.3}))
     friction = Along(truth.law, time, position).of(truth)
     loop = Loop(time, position, friction - inertia * w**2 * position)
-    level = SLIDING | {"fs": 0.3, "fc": 0.3}
+    level = Model("stribeck_plain", **(SLIDING | {"fs": 0.3, "fc": 0.3}))
     known = identify_presliding(loop, level, elements=2, noise=1e-3, inertia=inertia)
     assert sum(known.model.parameters.k) == pytest.approx(spring, rel=0.02)
     unknown = identify_presliding(loop, level, elements=2, noise=1e-3)
@@ -114,7 +135,9 @@ def test_intervals_hold_what_rows_counts_and_scale_hide(late: float, count: floa
     truth = Model("gms", k=[250.0, 125.0], alpha=[0.3, 0.7], c=90.0, **level)
     torque = np.interp(time - late * 0.01, time, Along(truth.law, time, position).of(truth))
     position = count * np.round(position / count) if count else position
-    found = identify_presliding(Loop(time, position, step * np.round(torque / step)), level, elements=2)
+    found = identify_presliding(
+        Loop(time, position, step * np.round(torque / step)), Model("stribeck_plain", **level), elements=2
+    )
     for name, value in {"k[0]": 250.0, "k[1]": 125.0, "alpha[0]": 0.3, "alpha[1]": 0.7}.items():
         assert found[name].lower <= value <= found[name].upper, name
         assert found[name].identified
