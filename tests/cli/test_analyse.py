@@ -19,6 +19,7 @@ COMMANDS = {
     "flexibility": TRAIN,
     "sides": ["run.npz", "again.npz"],
     "position": ["run.npz"],
+    "attraction": ["gms.toml"],
     "stability": ["--rig", "thesis-dry", "--bandwidth", "10", "--law", "lugre"],
 }
 
@@ -36,6 +37,9 @@ def records(tmp_path, monkeypatch):
         }
         units = {k: "N·m" if "torque" in k else "rad" for k in channels}
         Record(TIME, channels, units).save(f"{name}.npz")
+    (tmp_path / "gms.toml").write_text(
+        "law = 'gms'\n[parameters]\nk = [1e4]\nalpha = [1.0]\nc = 24.0\nfs = 0.335\nfc = 0.285\nvs = 0.01\n"
+    )
 
 
 @pytest.mark.parametrize("name", ANALYSES)

@@ -9,7 +9,12 @@ import pytest
 from stickslip import Model, Reference, respond
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.identify.presliding.attraction import identify_attraction, largest_without_overshoot
+from stickslip.identify.presliding.attraction import (
+    OVERSHOOT,
+    apply_overshoot_rule,
+    identify_attraction,
+    response_to_velocity,
+)
 from stickslip.identify.presliding.hysteresis import (
     Loop,
     choose_hysteresis,
@@ -161,16 +166,78 @@ def test_attraction_parameter_of_table_5() -> None:
         identify_attraction(back, template)
 
 
-def test_largest_attraction_without_overshoot_says_what_it_is_worth() -> None:
-    """Table 9's friction rises with the velocity: nothing overshoots. Table 1's falls: everything does."""
+GREASE = Model(
+    "gms", {"curve": "double_stribeck", "viscous": "power"}, k=[315.0885, 69.7325, 113.2177],
+    alpha=[0.1567, 0.4222, 0.4211], c=35.0, beta0=80.7454, beta1=-80.4742, beta2=-80.5930, beta3=0.7884, beta4=0.7871,
+    v1=0.1755, v2=0.1758, sigma2=-0.0054, fv2=0.0791, delta_v=0.3768,
+)  # fmt: skip
+"""Thesis Table 10."""
+
+
+def test_overshoot_of_the_grease_of_the_thesis_falls_with_attraction() -> None:
+    """Figure 4.38: the rule took C = 1, where the overshoot is greatest."""
+    found = apply_overshoot_rule(GREASE)
+    assert np.all(np.diff(found.overshoot) <= 0.0)
+    assert found.overshoot[0] == pytest.approx(0.0183, rel=0.01)
+    assert found.c == pytest.approx(732.0, rel=0.01)
+    none = apply_overshoot_rule(GREASE, upper=100.0)
+    assert none.c is None
+    assert "no C from 1 to 100 N·m/s qualifies" in none.sentence
+
+
+def test_the_response_to_a_sudden_velocity_has_converged() -> None:
+    """Reference: the same law in steps a tenth as long."""
+    rise, duration = 1e-3, 0.02
+    time = np.concatenate([np.linspace(0.0, rise, 1001), np.linspace(rise, duration, 10001)[1:]])
+    velocity = np.minimum(time / rise, 1.0) * 5.0
+    position = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time))])
+    fine = Along(GREASE.law, time, position, velocity).of(GREASE)
+    coarse_time, coarse = response_to_velocity(GREASE, 5.0, rise, duration)
+    assert np.max(np.abs(np.interp(coarse_time, time, fine) - coarse)) < 1e-4 * np.max(fine)
+
+
+def test_attraction_of_a_law_that_never_overshoots_is_not_determined() -> None:
+    """Table 9: friction rises with the velocity (figure 4.14)."""
     dry = {"fs": 0.2951, "fc": 0.3524, "vs": 0.003, "delta_s": 1.1, "sigma2": 0.0263}
     rising = Model("gms", k=[240.6583, 91.2208, 56.2779], alpha=[0.1983, 0.4008, 0.4009], c=90.0, **dry)
-    c, notes = largest_without_overshoot(rising)
-    assert c == 1e4
-    assert "does not determine C" in notes[0]
-    c, notes = largest_without_overshoot(PLANT)
-    assert c == 1.0
-    assert "Even C = 1" in notes[0]
+    found = apply_overshoot_rule(rising)
+    assert found.c is None
+    assert "does not determine C" in found.sentence
+    with pytest.raises(InputError, match="has no attraction parameter"):
+        apply_overshoot_rule(CURVE)
+
+
+HUMP = Model(
+    "gms", {"curve": "table"}, k=[1e7], alpha=[1.0], c=1.0, curve_velocity=[0.0, 0.5, 2.0, 4.0, 5.0],
+    curve_torque=[0.1, 0.5, 1.0, 0.5, 0.12],
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("model", "options", "qualifies"),
+    [(GREASE, {}, 1.02), (HUMP, {"upper": 300.0}, 0.98)],
+    ids=["overshoot falls with C", "overshoot grows with C"],
+)
+def test_the_first_attraction_without_overshoot(
+    model: Model, options: dict[str, float], qualifies: float
+) -> None:
+    found = apply_overshoot_rule(model, **options)
+    assert found.c is not None
+    for factor in (0.98, 1.02):
+        _, torque = found.response(factor * found.c)
+        over = np.max(torque) / model.sliding_torque(found.velocity) - 1.0 > OVERSHOOT
+        assert over == (factor != qualifies)
+
+
+def test_the_overshoot_rule_by_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "gms.toml"
+    file.write_text(
+        "law = 'gms'\n[parameters]\nk = [1e4]\nalpha = [1.0]\nc = 24.0\nfs = 0.335\nfc = 0.285\nvs = 0.01\n"
+    )
+    picture = tmp_path / "responses.svg"
+    assert main(["analyse", "attraction", str(file), "--plot", str(picture)]) == 0
+    assert "does not determine C: no C from 1 to 10000 N·m/s overshoots" in capsys.readouterr().out
+    assert "C = 24 N·m/s, of the model" in picture.read_text()
 
 
 def test_any_law_is_fitted_along_a_motion(tmp_path: Path) -> None:
