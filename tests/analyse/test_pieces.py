@@ -64,6 +64,19 @@ def test_the_repeatability_of_the_thesis_by_command(tmp_path, capsys):
     assert found["range_of_starts"] == pytest.approx(3.96e-3, rel=0.01)
 
 
+def test_figure_4_32_by_command(tmp_path, capsys):
+    """With both directions in one range, the change over an hour was 5.0 %."""
+    file = tmp_path / "later.npz"
+    settings = ["--set", "velocities=0.3,0.3,0.3", "--set", "rest=1800"]
+    assert main(["rig", "run", "sliding", "--rig", "thesis-grease", *settings, "--out", str(file)]) == 0
+    capsys.readouterr()
+    assert main(["analyse", "position", str(file), "--channel", "sensor_torque", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["drift"] == pytest.approx(0.0203, abs=5e-4)
+    means = np.array([one["mean"] for one in found["passes"]]).reshape(3, 2)
+    assert found["drift"] == pytest.approx(np.max(np.ptp(means, axis=0) / np.mean(means, axis=0)), rel=1e-6)
+
+
 def test_other_records_stay_whole():
     record = perform(Repeat(times=2, interval=30.0, duration=0.5), VirtualRig(GREASE)).record
     plain = type(record)(record.time, record.channels, record.units)

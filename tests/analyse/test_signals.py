@@ -163,5 +163,6 @@ def test_position_dependence_and_drift_are_told_apart():
     assert found.drift == pytest.approx(rise / (1.0 + 30.0 / 6000.0), rel=0.05)
     back = Record(time, {"position": -position, "motor_torque": -torque}, run.units)
     assert dependence({"back": back}).passes[0].mean == pytest.approx(found.passes[0].mean, rel=1e-3)
+    assert dependence({"forth": run, "back": back}).drift == pytest.approx(found.drift, rel=1e-3)
     with pytest.raises(InputError, match="revolution"):
         dependence({"short": Record(time[:9000], {k: v[:9000] for k, v in run.channels.items()}, run.units)})

@@ -97,7 +97,7 @@ def repeatability(groups: Mapping[str, Sequence[Record]], channel: str = "positi
     ----------
     groups : mapping of str to sequence of Record
         Runs of the same motion, by controller; at least two each. Times count from the start of each run, positions
-        from the start of its reference, if there is one. The length that all runs of a group have in common is compared.
+        from the start of its reference, if there is one. The length that the runs have in common is compared.
     channel : str
         As for `stickslip.analyse.spectrum.spectrum`.
 

@@ -125,7 +125,7 @@ def picture_of_dependence(found: Dependence) -> Drawn:
     speeds = np.abs([p.velocity for p in found.passes])
     if len({p.time for p in found.passes}) > 2 and np.ptp(speeds) < 0.02 * float(np.mean(speeds)):
         panels.append(Panel([*_means(found)], "mean (N·m)", "time (s)"))
-        message += f"; the mean changes by {100.0 * found.drift:.2g} %"
+        message += f"; the mean changes by {100.0 * found.drift:.2g} % in one direction"
     return "Torque against position", message, panels, 2.4 if len(panels) == 1 else 2.0
 
 
