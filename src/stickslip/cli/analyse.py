@@ -2,7 +2,7 @@
 
 stickslip analyse spectrum run.npz --mode "elastic mode=335" --plot spectrum.png
 stickslip analyse repeatability PID=1.npz PID=2.npz LuGre=3.npz LuGre=4.npz
-stickslip analyse flexibility --stiffness 17800,396 --inertia 4.2757e-4 --torque dry=0.2951 --claimed 270
+stickslip analyse flexibility --stiffness 17800,396 --inertia 4.2757e-4 --torque dry=0.2951 --claimed 270,2750
 stickslip analyse sides slow.npz fast.npz
 stickslip analyse position slow.npz --channel sensor_torque
 stickslip analyse stability --rig thesis-dry --linear PD --bandwidth 36 --plot map.png
@@ -163,7 +163,7 @@ def _repeatability(args: argparse.Namespace) -> None:
 
 def _flexibility_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--stiffness", required=True, metavar="K1,K2", help="spring stiffnesses, motor first, N·m/rad"
+        "--stiffness", default="", metavar="K1,K2", help="spring stiffnesses, motor first, N·m/rad"
     )
     parser.add_argument(
         "--inertia", required=True, metavar="J or J1,J2,J3", help="total inertia or its parts, kg·m²"
@@ -175,16 +175,33 @@ def _flexibility_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="[NAME=]NM",
         help="torque for the static twist; repeatable",
     )
-    parser.add_argument("--claimed", metavar="F1,F2", help="claimed first modes to check, Hz")
+    parser.add_argument(
+        "--shaft", action="append", default=[], metavar="D,L,G",
+        help="round shaft after the springs of --stiffness: diameter and length (m), shear modulus (Pa); repeatable",
+    )  # fmt: skip
+    parser.add_argument(
+        "--claimed", metavar="F1,F2", help="claimed elastic modes to check, first and second, Hz"
+    )
 
 
 def _flexibility(args: argparse.Namespace) -> None:
-    from stickslip.analyse.flexibility import flexibility
+    from stickslip.analyse.flexibility import flexibility, shaft_stiffness
     from stickslip.config import listed_numbers, named_numbers
+    from stickslip.errors import InputError
 
+    springs = list(listed_numbers(args.stiffness, "--stiffness", "N·m/rad")) if args.stiffness else []
+    for text in args.shaft:
+        shaft = listed_numbers(text, "--shaft", "m, m, Pa")
+        if len(shaft) != 3:
+            raise InputError(
+                f"--shaft {text} must be diameter,length,shear modulus, such as 0.012,0.396,77e9"
+            )
+        springs.append(shaft_stiffness(*shaft))
+    if not springs:
+        raise InputError("analyse flexibility needs --stiffness K1,K2 or --shaft D,L,G")
     inertias = listed_numbers(args.inertia, "--inertia", "kg·m²")
     found = flexibility(
-        listed_numbers(args.stiffness, "--stiffness", "N·m/rad"), sum(inertias),
+        springs, sum(inertias),
         torques=named_numbers(args.torque, "--torque", "N·m", value="NM", nameless=True),
         inertias=inertias if len(inertias) > 1 else (),
         claimed=listed_numbers(args.claimed, "--claimed", "Hz") if args.claimed else (),

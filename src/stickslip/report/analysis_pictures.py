@@ -203,11 +203,13 @@ def picture_of_flexibility(found: Flexibility) -> Drawn:
         Curve(ends, np.full(2, found.floor), f"lowest possible, {found.floor:.0f} Hz", Style("#000000", "-", 1.6))
     )  # fmt: skip
     curves += [
-        Curve(ends, np.full(2, f), f"stated, {f:.0f} Hz", Style(DASHED[i].colour, BOUND.dashes, 1.4))
-        for i, f in enumerate(found.claimed)
+        Curve(
+            ends, np.full(2, f), f"stated first mode, {f:.0f} Hz", Style(DASHED[0].colour, BOUND.dashes, 1.4)
+        )
+        for f in found.claimed[:1]
     ]
     top = 2.5 * found.floor
-    impossible = [f for f in found.claimed if f < found.floor]
+    impossible = [f for i, f in enumerate(found.claimed, 1) if f < found.lowest(i)]
     what = " and ".join(f"{f:g} Hz" for f in impossible)
     message = f"no division of {found.inertia:.4g} kg·m² puts the first mode below {found.floor:.0f} Hz" + (
         f"; {what}: impossible" if impossible else ""
