@@ -33,7 +33,7 @@ from stickslip.identify.presliding.hysteresis import (
     turning_points,
 )
 from stickslip.identify.presliding.known_curve import describe_unused, static_levels, transfer_curve
-from stickslip.identify.presliding.loop_doubt import doubted
+from stickslip.identify.presliding.loop_uncertainty import add_systematic_errors
 from stickslip.model import Model
 from stickslip.simulation.prescribed.motion import Along
 
@@ -239,7 +239,9 @@ def identify_presliding(
         )
     simulated = curve_of(along, fitted.vector, fitted.u)
     model = fitted.vector.model(fitted.u)
-    estimates = doubted(straight, fitted, found, setup.frozen(model), {"noise": setup.noise, **setup.fitted})
+    estimates = add_systematic_errors(
+        straight, fitted, found, setup.frozen(model), {"noise": setup.noise, **setup.fitted}
+    )
     notes = (*notes, *describe_unused(curve, model), *loop_notes(straight, model, rows, rest))
     return Identification(
         "presliding", model, estimates, fitted.correlation, loop_misfit(straight, simulated, rows, rest, fitted),
