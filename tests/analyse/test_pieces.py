@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from stickslip.analyse.dependence import dependence
 from stickslip.analyse.motor_vs_sensor import sides
 from stickslip.analyse.repeatability import repeatability
 from stickslip.analyse.split_runs import pieces
+from stickslip.cli import main
 from stickslip.machines.files import machine
 from stickslip.report.analysis_pictures import draw_analysis, picture_of_dependence
 from stickslip.rigs.procedures.base import perform
@@ -47,6 +50,31 @@ def test_a_repeat_is_its_repetitions():
     assert [name for name, _ in parts] == ["PID 1", "PID 2", "PID 3"]
     found = repeatability({"PID": [part for _, part in parts]})
     assert found[0].runs.shape[0] == 3
+
+
+def test_the_repeatability_of_the_thesis_by_command(tmp_path, capsys):
+    """Section 4.4: with the positions at which the runs start counted as spread, it was 1.64 mrad."""
+    file = tmp_path / "PID.npz"
+    settings = ["--set", "bandwidth=10", "--set", "damping=0.85"]
+    assert main(["rig", "run", "repeat", "--rig", "thesis-grease", *settings, "--out", str(file)]) == 0
+    capsys.readouterr()
+    assert main(["analyse", "repeatability", str(file), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["rms_spread"] == pytest.approx(0.45e-3, rel=0.02)
+    assert found["range_of_starts"] == pytest.approx(3.96e-3, rel=0.01)
+
+
+def test_figure_4_32_by_command(tmp_path, capsys):
+    """With both directions in one range, the change over an hour was 5.0 %."""
+    file = tmp_path / "later.npz"
+    settings = ["--set", "velocities=0.3,0.3,0.3", "--set", "rest=1800"]
+    assert main(["rig", "run", "sliding", "--rig", "thesis-grease", *settings, "--out", str(file)]) == 0
+    capsys.readouterr()
+    assert main(["analyse", "position", str(file), "--channel", "sensor_torque", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["drift"] == pytest.approx(0.0203, abs=5e-4)
+    means = np.array([one["mean"] for one in found["passes"]]).reshape(3, 2)
+    assert found["drift"] == pytest.approx(np.max(np.ptp(means, axis=0) / np.mean(means, axis=0)), rel=1e-6)
 
 
 def test_other_records_stay_whole():

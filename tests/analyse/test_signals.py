@@ -98,6 +98,20 @@ def test_runs_of_different_start_and_length_are_laid_over_each_other():
     assert found.rms_spread < 1e-12
 
 
+def test_runs_of_the_same_motion_count_from_their_own_start():
+    runs = [
+        record(
+            10.0,
+            position=lambda t, s=start: s + np.sin(t),
+            position_reference=lambda t, s=start: s + np.sin(t),
+        )
+        for start in (0.0, 0.3, -0.2)
+    ]
+    (found,) = repeatability({"PID": runs})
+    assert found.rms_spread < 1e-12
+    assert found.as_dict()["range_of_starts"] == pytest.approx(0.5)
+
+
 def test_bearings_between_motor_and_sensor_are_found():
     def sliding(speed, seed):
         t = np.arange(5000) / RATE
@@ -149,5 +163,6 @@ def test_position_dependence_and_drift_are_told_apart():
     assert found.drift == pytest.approx(rise / (1.0 + 30.0 / 6000.0), rel=0.05)
     back = Record(time, {"position": -position, "motor_torque": -torque}, run.units)
     assert dependence({"back": back}).passes[0].mean == pytest.approx(found.passes[0].mean, rel=1e-3)
+    assert dependence({"forth": run, "back": back}).drift == pytest.approx(found.drift, rel=1e-3)
     with pytest.raises(InputError, match="revolution"):
         dependence({"short": Record(time[:9000], {k: v[:9000] for k, v in run.channels.items()}, run.units)})

@@ -19,6 +19,7 @@ COMMANDS = {
     "flexibility": TRAIN,
     "sides": ["run.npz", "again.npz"],
     "position": ["run.npz"],
+    "attraction": ["gms.toml"],
     "stability": ["--rig", "thesis-dry", "--bandwidth", "10", "--law", "lugre"],
 }
 
@@ -36,6 +37,9 @@ def records(tmp_path, monkeypatch):
         }
         units = {k: "N·m" if "torque" in k else "rad" for k in channels}
         Record(TIME, channels, units).save(f"{name}.npz")
+    (tmp_path / "gms.toml").write_text(
+        "law = 'gms'\n[parameters]\nk = [1e4]\nalpha = [1.0]\nc = 24.0\nfs = 0.335\nfc = 0.285\nvs = 0.01\n"
+    )
 
 
 @pytest.mark.parametrize("name", ANALYSES)
@@ -53,6 +57,20 @@ def test_numbers_of_the_flexibility(capsys):
     assert "303.0 Hz" in out
     assert "270 Hz is impossible" in out
     assert "1.66e-05, 0.000745 rad" in out
+    shaft = [
+        "--stiffness",
+        "17800",
+        "--shaft",
+        "0.012,0.396,77e9",
+        "--inertia",
+        "4.2757e-4",
+        "--claimed",
+        "270,2750",
+    ]
+    assert main(["analyse", "flexibility", *shaft]) == 0
+    out = capsys.readouterr().out
+    assert "springs 17800, 395.8" in out
+    assert "a second mode at 2750 Hz is possible" in out
 
 
 @pytest.mark.parametrize(
@@ -65,6 +83,8 @@ def test_numbers_of_the_flexibility(capsys):
         ["repeatability", "PID=run.npz"],
         ["flexibility", "--stiffness", "soft", "--inertia", "1"],
         ["flexibility", "--stiffness", "1,2", "--inertia", "1,2"],
+        ["flexibility", "--inertia", "1"],
+        ["flexibility", "--inertia", "1", "--shaft", "0.012,0.4"],
         ["position", "run.npz", "--transient", "100000"],
         ["position", "run.npz", "--plot", "picture.doc"],
         ["stability", "--rig", "none"],

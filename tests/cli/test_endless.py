@@ -13,6 +13,7 @@ from stickslip.errors import InputError
 from stickslip.identify.presliding.hysteresis import Loop
 from stickslip.identify.presliding.presliding import GRID, identify_presliding
 from stickslip.identify.regression.inverse import refuse_harmonics
+from stickslip.model import Model
 from stickslip.readers import read
 from stickslip.record import Record
 
@@ -67,7 +68,7 @@ def test_a_loop_has_no_more_elements_than_its_fit_tells_apart():
     record = Record(time, channels, {"position": "rad", "motor_torque": "N·m"}, {})
     with pytest.raises(InputError, match=f"elements = 100000000 must be at most {GRID}"):
         identify_presliding(
-            Loop.of(record, "motor_torque"), {"fs": 1.2, "fc": 1.0, "vs": 0.1}, elements=10**8
+            Loop.of(record, "motor_torque"), Model("stribeck_plain", fs=1.2, fc=1.0, vs=0.1), elements=10**8
         )
 
 

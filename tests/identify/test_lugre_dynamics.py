@@ -12,6 +12,7 @@ from stickslip.identify.presliding.lugre_dynamics import Response, fit_position,
 
 INERTIA = 3.8623e-4
 SLIDING = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
+CURVE = Model("stribeck_plain", **SLIDING)
 PLANT = Model("gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, **SLIDING)
 
 
@@ -33,7 +34,7 @@ def thesis_record() -> Response:
 
 @pytest.fixture(scope="module")
 def thesis_result(thesis_record: Response) -> Identification:
-    return identify_lugre_dynamics(thesis_record, INERTIA, SLIDING)
+    return identify_lugre_dynamics(thesis_record, INERTIA, CURVE)
 
 
 @pytest.mark.slow
@@ -64,7 +65,7 @@ def test_a_coarse_encoder_hides_the_stiffness(thesis_record: Response) -> None:
     coarse = Response(
         thesis_record.time, thesis_record.torque, count * np.round(thesis_record.position / count)
     )
-    result = identify_lugre_dynamics(coarse, INERTIA, SLIDING, noise=count / math.sqrt(12.0))
+    result = identify_lugre_dynamics(coarse, INERTIA, CURVE, noise=count / math.sqrt(12.0))
     assert not result["sigma0"].identified
     assert not result["stiffness"].identified
 
@@ -75,7 +76,7 @@ def test_a_lugre_contact_is_found_by_its_position() -> None:
     exact = response_of(truth, 1.0)
     noisy = exact.position + np.random.default_rng(0).normal(0.0, 1e-5, exact.time.size)
     found = fit_position(
-        Response(exact.time, exact.torque, noisy), INERTIA, SLIDING, sigma0=2e4, sigma1=0.3, noise=1e-5
+        Response(exact.time, exact.torque, noisy), INERTIA, CURVE, sigma0=2e4, sigma1=0.3, noise=1e-5
     )
     assert found.rms == pytest.approx(1e-5, rel=0.1)
     assert found.values["sigma0"] == pytest.approx(3.5e4, rel=0.01)
@@ -92,7 +93,7 @@ def test_a_bad_first_sample_moves_nothing(start: float) -> None:
     found = fit_position(
         Response(exact.time, exact.torque, noisy),
         INERTIA,
-        SLIDING,
+        CURVE,
         sigma0=start,
         sigma1=0.3,
         noise=1e-4,
@@ -108,4 +109,4 @@ def test_bad_responses_get_one_clear_error() -> None:
     with pytest.raises(InputError, match="strictly ascending"):
         Response(0.0 * t, t, t)
     with pytest.raises(InputError, match="never sticks"):
-        identify_lugre_dynamics(Response(t, t + 1.0, t), INERTIA, SLIDING)
+        identify_lugre_dynamics(Response(t, t + 1.0, t), INERTIA, CURVE)

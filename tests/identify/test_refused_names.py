@@ -6,11 +6,12 @@ import pytest
 
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.methods import METHODS, method_named
+from stickslip.identify.methods._records import known_curve
 from stickslip.identify.methods.method import Options
 from stickslip.identify.methods.sliding import refuse_unknown
 from stickslip.model import Model
 
-OWN = ("axis", "cogging", "sliding")
+OWN = ("axis", "cogging", "sliding", "presliding", "lugre")
 """Those that look at parameters of a law, or at names of their own, themselves."""
 
 
@@ -23,6 +24,20 @@ def test_a_method_refuses_what_it_would_not_hear(name: str) -> None:
         with pytest.raises(InputError, match=f"--method {name} has no '(rubbish|fc)' for --{option}"):
             method.refuse_unknown(given)
     method.refuse_unknown(Options(values=dict.fromkeys(method.values or (), 1.0)))
+
+
+def test_a_curve_has_the_parameters_of_its_law() -> None:
+    asymmetric = Model("stribeck_plain", {"symmetry": "asymmetric"}, fs=1.2, fc=1.0, vs=0.1, fs_negative=1.3,
+                       fc_negative=1.1, vs_negative=0.2)  # fmt: skip
+    curve = known_curve(
+        Options(model=asymmetric, values={"fc_negative": 1.05, "inertia": 1.0}), "lugre", ("inertia",)
+    )
+    assert (curve.parameters.fc, curve.parameters.fc_negative) == (1.0, 1.05)
+    for model in (None, asymmetric):
+        with pytest.raises(UnknownName, match="'rubbish'"):
+            known_curve(Options(model=model, values={"rubbish": 3.0}), "presliding", ("inertia",))
+    with pytest.raises(InputError, match="lacks vs"):
+        known_curve(Options(values={"fs": 1.2, "fc": 1.0}), "presliding", ())
 
 
 def test_sliding_knows_the_parameters_of_its_curves() -> None:

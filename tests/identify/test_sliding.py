@@ -1,6 +1,7 @@
 """The sliding curve: the thesis's experiments on its own friction, segments of records, choice of a curve."""
 
 import functools
+import json
 import math
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
+from stickslip.cli import main
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
 from stickslip.identify.sliding.choice import candidates, choose_sliding
@@ -15,6 +17,7 @@ from stickslip.identify.sliding.curve import identify_sliding
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.identify.sliding.segments import constant_velocity_segments, sliding_points
 from stickslip.report.identification import draw_picture_to
+from support.places import REFERENCE, needs_reference
 
 TABLE_1 = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
 VELOCITIES = np.array([0.001, 0.025, 0.03, 0.04, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0])  # (3.18)
@@ -43,6 +46,25 @@ def test_table_1_to_six_digits() -> None:
     # The residual of a perfect fit says nothing about the noise.
     assert set(result.not_identified) == set(TABLE_1)
     assert "noise" in result["fs"].verdict
+
+
+@needs_reference("identification.json")
+def test_table_1_by_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Static friction, extrapolated to rest, lies above the torque at the slowest velocity."""
+    points = json.loads((REFERENCE / "identification.json").read_text())["stribeck_points"]
+    rows, time, angle = [], 0.0, 0.0
+    for velocity, torque in zip(points["velocity"][::-1], points["torque"][::-1], strict=True):
+        for _ in range(round(max(1.0, min(7.0 / velocity, 20.0)) / 0.01)):
+            rows.append(f"{time!r},{angle!r},{torque!r}")
+            time, angle = time + 0.01, angle + 0.01 * velocity
+    log = tmp_path / "constant_velocities.csv"
+    log.write_text("\n".join(["time [s],position [rad],torque [Nm]", *rows]))
+    level = ["--freeze", "offset", "--set", "offset=0", "--noise", "1e-9"]
+    command = ["identify", str(log), "--method", "sliding", "--law", "stribeck_plain", *level]
+    assert main([*command, "--json", "--no-report", "--out", str(tmp_path / "m.toml")]) == 0
+    found = {e["name"]: e for e in json.loads(capsys.readouterr().out)["estimates"]}
+    assert {n: found[n]["value"] for n in TABLE_1} == pytest.approx(TABLE_1, rel=1e-4)
+    assert all(found[n]["lower"] <= TABLE_1[n] <= found[n]["upper"] for n in TABLE_1)
 
 
 @pytest.mark.parametrize(

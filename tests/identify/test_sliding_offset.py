@@ -150,8 +150,6 @@ def test_by_direction_a_law_takes_it_up() -> None:
     assert "offset" not in found.parameters
     assert found["fc"].value - found["fc_negative"].value == pytest.approx(0.08, abs=2e-3)
     assert any("holds offset at 0" in note for note in found.notes)
-    with pytest.raises(InputError, match="needs a law; name one"):
-        ss.identify(record(0.04), method="sliding", per_direction=True)
     with pytest.raises(InputError, match="both directions, and the record has one"):
         ss.identify(record(0.04, (1.0,)), method="sliding", law="coulomb", per_direction=True)
 
@@ -160,3 +158,18 @@ def test_a_criterion_that_too_few_points_do_not_have_is_left_out() -> None:
     found = identify_sliding(points(0.0, 1, (6.0, 12.0, -6.0, -12.0), std=False), COULOMB, starts=4)
     assert "aicc" not in found.misfit
     assert np.isfinite(list(found.misfit.values())).all()
+
+
+def test_a_curve_is_chosen_for_each_direction() -> None:
+    """Without a law, --per-direction was refused: no curve of both directions for the methods that need one."""
+    both = ss.Model("stribeck_plain", {"symmetry": "asymmetric"}, **LAW.parameters._asdict(), fs_negative=0.30,
+                    fc_negative=0.24, vs_negative=0.08, delta_s_negative=2.0, sigma2_negative=0.03)  # fmt: skip
+    speeds = np.geomspace(0.01, 2.0, 12)
+    velocity = np.concatenate([speeds, -speeds])
+    table = {"velocity": velocity, "motor_torque": both.sliding_torque(velocity)}
+    found = ss.identify(table, method="sliding", per_direction=True, noise=1e-4).identification
+    assert found.model is not None
+    assert found.model.law.option_of("symmetry") == "asymmetric"
+    assert found.details["chosen"] == "Stribeck (eq. 2.6)"
+    for name, value in both.parameters._asdict().items():
+        assert found[name].value == pytest.approx(value, rel=1e-3)

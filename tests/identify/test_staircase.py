@@ -75,8 +75,7 @@ def test_no_slow_level_of_a_staircase_is_lost(fine: Record) -> None:
     speeds = sorted(round(math.degrees(s.velocity), 1) for s in found)
     assert set(speeds) >= {s * d for d in DEGREES[1:] for s in (1.0, -1.0)} | {1.0}
     assert all(abs(d.velocity) < math.radians(1.1) for d in dropped)
-    points, notes = sliding_points(fine)
-    assert points.largest == np.max(np.abs(fine["motor_torque"]))
+    _, notes = sliding_points(fine)
     assert "20 degrees or a fifth" in notes[0]
     left = next(note for note in notes if note.startswith("Left out"))
     assert "-0.017" in left
@@ -117,17 +116,14 @@ def test_what_depends_on_the_angle_counts_as_the_doubt_of_less_than_a_revolution
     assert any("adds to their uncertainty" in note for note in notes)
 
 
-def test_no_level_of_friction_lies_above_the_largest_torque(fine: Record) -> None:
+def test_a_static_torque_without_evidence_is_not_identified(fine: Record) -> None:
     """Levels above the Stribeck velocity only: F_S was 6.9e15 N·m and more."""
     points, _ = sliding_points(fine)
     fast = points.only(np.abs(points.velocity) > 0.8)
     start = Model("lugre", sigma0=1e4, fs=1.5, fc=0.8, vs=0.4, delta_s=0.8, sigma2=0.1)
     result = identify_sliding(fast, start, starts=10)
-    assert result["fs"].value <= points.largest
-    assert result["fs"].upper <= points.largest
     assert set(result.not_identified) >= {"fs", "vs", "delta_s"}
-    alone = SlidingPoints(fast.velocity, fast.torque)
-    assert identify_sliding(alone, start, starts=10)["fs"].value <= 10.0 * np.max(np.abs(fast.torque))
+    assert result["fs"].value <= 10.0 * np.max(np.abs(fast.torque))
 
 
 def test_what_acts_below_the_slowest_speed_is_extrapolated() -> None:
@@ -182,7 +178,7 @@ def test_coulomb_and_viscous_friction_are_told_where_the_stribeck_curve_is_not()
     friction = np.sign(v) * (1.0 + 0.2 * np.exp(-((v / 0.04) ** 2))) + 0.35 * v
     std = np.where(np.abs(v) < 0.2, 0.05, 0.004)
     torque = friction + std * np.random.default_rng(5).standard_normal(v.size)
-    result = identify_sliding(SlidingPoints(v, torque, std, largest=3.0, absolute=True), LUGRE, starts=8)
+    result = identify_sliding(SlidingPoints(v, torque, std, absolute=True), LUGRE, starts=8)
     assert {"vs", "delta_s"} <= set(result.not_identified)
     for name in ("fc", "sigma2"):
         assert result[name].identified

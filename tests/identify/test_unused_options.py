@@ -21,6 +21,7 @@ GIVEN: dict[str, tuple[dict[str, Any], list[str]]] = {
     "noise": ({"noise": 0.1}, ["--noise", "0.1"]),
     "torque": ({"torque_channel": "sensor_torque"}, ["--torque", "sensor_torque"]),
     "elements": ({"elements": 2}, ["--elements", "2"]),
+    "shares": ({"shares": "equal"}, ["--shares", "equal"]),
     "threshold": ({"threshold": 0.1}, ["--threshold", "0.1"]),
     "held_out": ({"hold_out": "other.csv"}, ["--hold-out", "other.csv"]),
     "inverse": ({"inverse": True}, ["--inverse"]),

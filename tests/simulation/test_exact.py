@@ -343,3 +343,15 @@ def test_a_feedforward_over_too_long_a_run_is_refused(monkeypatch):
     controller = Controller(PD, Feedforward(GMS))
     with pytest.raises(InputError, match=r"duration = 400 s: .*more than 3000 pieces.*shorter run"):
         exact.run(loop(GMS, controller, SINE, 400.0))
+
+
+def test_a_law_with_parameters_for_each_direction_is_refused_for_that_reason():
+    """It was said that GMS gives no elements."""
+    both = {"fs_negative": 0.3, "fc_negative": 0.25, "vs_negative": 0.01}
+    asymmetric = Model("gms", {"symmetry": "asymmetric"}, **PLANT, **both)
+    with pytest.raises(
+        InputError, match="law 'gms' has symmetry = asymmetric, for which its flow has no closed form"
+    ):
+        simulate(RigidAxis(INERTIA, asymmetric), Controller(PD), SINE, 0.1, integrator="exact")
+    record = simulate(RigidAxis(INERTIA, asymmetric), Controller(PD), SINE, 0.1)
+    assert record.meta["integrator"] == "adaptive"

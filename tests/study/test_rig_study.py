@@ -16,7 +16,8 @@ from stickslip.study.experiments import NOMINAL, ExperimentRun, ExperimentView, 
 from stickslip.study.plan import load, select
 from stickslip.study.rerun import rerun
 from stickslip.thesis.rig_claims import CLAIMS
-from stickslip.thesis.rig_verdicts import Judged, main_share
+from stickslip.thesis.rig_reasons import WHY
+from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share, tally_imperfections, tally_starts
 
 LAWS = ("coulomb", "stribeck", "lugre", "gms")
 NOT_MORE = {"seeds": 0, "ablation": False}
@@ -173,8 +174,84 @@ def test_what_cannot_be_an_experiment_is_said(old, new, said, tmp_path):
 
 def test_main_statements_are_counted_over_what_was_run():
     ran = {"dry-low-PID": True, "dry-low-FB-gms": False, "grease-low-FB-gms": True}
-    judged = [Judged(c, ran.get(c.id), "", 0, 0, (), main=True) for c in CLAIMS]
+    judged = [Judged(c, ran.get(c.id), "", 0, 0, 0, (), main=True) for c in CLAIMS]
     assert main_share(judged) == {"PID of 36 Hz oscillates": (1, 1), "GMS feedback is unstable": (1, 2)}
+
+
+class Numbers:
+    """Metrics of runs, the same in every variant but those named."""
+
+    def __init__(self, metrics, **variants):
+        self.metrics, self.variants = metrics, variants
+
+    def metric(self, rule, case, name):
+        return {**self.metrics, **self.variants.get(rule, {})}[case, name]
+
+    def record(self, rule, case):
+        raise KeyError(case)
+
+
+def near(lugre, gms):
+    group = "grease-low-PD25"
+    values = {"coulomb": 8.63e-3, "stribeck": 2.32e-3, "lugre": lugre, "gms": gms}
+    return {(f"{group}/FF-{law}", "near_zero_rms_rad"): x for law, x in values.items()}
+
+
+def judgement(view, variants, id):
+    return next(j for j in judged_over(view, variants) if j.claim.id == id)
+
+
+def test_reasons_are_the_numbers_of_the_runs():
+    """`GMS is better` was printed whatever the runs gave, and an imperfection was denied that nobody had tried."""
+    view = Numbers(near(1.42e-3, 0.779e-3), **{"without position": near(0.5e-3, 0.779e-3)})
+    alone = judgement(view, ["as it is"], "grease-low-lugre")
+    assert "FF-gms: less error near zero velocity than FF-lugre, by up to 45 %" in alone.reason
+    assert alone.reason.endswith("Not tried without single imperfections.")
+    tried = judgement(view, ["as it is", "without position", "without cogging"], "grease-low-lugre")
+    assert tried.reason.endswith("It holds without position.")
+    same = judgement(Numbers(near(1.42e-3, 0.779e-3)), ["as it is", "without cogging"], "grease-low-lugre")
+    assert same.reason.endswith("No single imperfection decides it.")
+    assert judgement(Numbers(near(0.5e-3, 0.779e-3)), ["as it is"], "grease-low-lugre").reason == ""
+
+
+def test_a_steady_state_error_that_feedforward_keeps_is_named():
+    group, values = "grease-step-PID10", {"PID": 1.23, "FF-coulomb": 0.583, "FF-lugre": 0.051, "FF-gms": 1.36}
+    view = Numbers({(f"{group}/{name}", "steady_state_error_rad"): 1e-3 * x for name, x in values.items()})
+    reason = judgement(view, ["as it is"], "grease-step-PID10-steady").reason
+    assert "less with FF-coulomb 0.583 mrad, FF-lugre 51 µrad; not with FF-gms 1.36 mrad" in reason
+
+
+def test_the_error_of_lugre_above_stribeck_is_computed():
+    group = "grease-low-PD25"
+    rms = {"coulomb": 6.75, "stribeck": 1.73, "lugre": 1.93, "gms": 1.17}
+    values = {(f"{group}/FF-{law}", "position_rms_rad"): 1e-3 * x for law, x in rms.items()}
+    reason = judgement(
+        Numbers({**values, **near(1.42e-3, 0.779e-3)}), ["as it is"], "grease-low-dynamic"
+    ).reason
+    assert "12 % above Stribeck's; near zero velocity it is smaller" in reason
+
+
+def test_every_reason_belongs_to_a_statement():
+    assert {claim.id for claim in CLAIMS} >= set(WHY)
+
+
+def test_statements_are_counted_over_starts_and_imperfections():
+    by_id = {
+        "dry-low-PID": (True, 4, ("delay",)),
+        "dry-low-FB-gms": (False, 0, ("delay",)),
+        "45-PD36": (False, 2, ()),
+    }
+    judged = [
+        Judged(c, by_id[c.id][0], "", 4, by_id[c.id][1], 2, by_id[c.id][2], True)
+        for c in CLAIMS
+        if c.id in by_id
+    ]
+    found = {t.words: (t.statements, t.hold, t.always, t.never, t.share) for t in tally_starts(judged)}
+    assert found == {
+        "dry, slow sine": (2, 1, 1, 1, 0.5), "4.5, resonances": (1, 0, 0, 0, 0.5), "all": (3, 1, 1, 1, 0.5)
+    }  # fmt: skip
+    assert tally_imperfections(judged) == {"delay": (1, 1)}
+    assert tally_starts([Judged(c, True, "", 0, 0, 0, (), False) for c in CLAIMS]) == []
 
 
 # Neither refusals nor the file hang on how many machines the study builds: further starts and ablation are 74 of them.

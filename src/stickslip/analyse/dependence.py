@@ -24,6 +24,8 @@ BINS = 72
 FULL = 0.9
 """Share of the bins that a pass must fill."""
 HARMONICS = 4
+SAME_VELOCITY = 0.02
+"""Relative difference of the mean velocities of repeated passes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +34,8 @@ class Pass:
 
     Attributes
     ----------
-    name : str
-        Of the record.
+    name, channel : str
+        Of the record, and of the torque.
     time : float
         s, middle of the pass on the record's clock.
     velocity : float
@@ -43,6 +45,7 @@ class Pass:
     """
 
     name: str
+    channel: str
     time: float
     velocity: float
     torque: Array
@@ -56,6 +59,11 @@ class Pass:
     def swing(self) -> float:
         """Peak to peak over the angle, N·m."""
         return float(np.nanmax(self.torque) - np.nanmin(self.torque))
+
+    def is_repeat_of(self, other: Pass) -> bool:
+        """Whether it is the same torque at the same velocity, in the same direction."""
+        same = abs(self.velocity - other.velocity) <= SAME_VELOCITY * abs(other.velocity)
+        return same and self.channel == other.channel
 
     def harmonics(self, count: int = HARMONICS) -> Array:
         """Amplitudes of the first harmonics of a revolution, N·m, by least squares."""
@@ -102,9 +110,19 @@ class Dependence:
 
     @property
     def drift(self) -> float:
-        """Range of the passes' means over their mean: how much the level changes from pass to pass."""
-        means = [p.mean for p in self.passes]
-        return (max(means) - min(means)) / abs(float(np.mean(means)))
+        """Greatest range of the means of passes at one velocity in one direction, relative to their mean.
+
+        NaN if no velocity is repeated.
+        """
+        groups: list[list[Pass]] = []
+        for p in self.passes:
+            group = next((g for g in groups if p.is_repeat_of(g[0])), None)
+            if group is None:
+                groups.append([p])
+            else:
+                group.append(p)
+        means = [np.array([p.mean for p in group]) for group in groups if len(group) > 1]
+        return max((float(np.ptp(m) / abs(np.mean(m))) for m in means), default=math.nan)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -128,11 +146,9 @@ class Dependence:
         ]
         if len(self.passes) < 2:
             return rows
-        return [
-            *rows,
-            f"over the passes the mean changes by {100 * self.drift:.3g} %, the shape is kept to a correlation of "
-            f"{self.alike:.3f}",
-        ]
+        change = f"the mean changes by {100 * self.drift:.3g} % at one velocity and direction, "
+        kept = f"the shape is kept to a correlation of {self.alike:.3f}"
+        return [*rows, f"over the passes {change if math.isfinite(self.drift) else ''}{kept}"]
 
 
 def dependence(
@@ -195,4 +211,4 @@ def _passes(name: str, record: Record, channel: str, transient: float) -> Iterat
         over = np.divide(sums, counts, out=np.full(BINS, math.nan), where=counts > 0)
         time = record.time[rows]
         speed = (position[rows[-1]] - position[rows[0]]) / (time[-1] - time[0])
-        yield Pass(name, float(0.5 * (time[0] + time[-1])), float(speed), over)
+        yield Pass(name, channel, float(0.5 * (time[0] + time[-1])), float(speed), over)

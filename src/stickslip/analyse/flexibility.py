@@ -13,7 +13,8 @@ For a free chain of n inertias with total J, whose spring i has J_left before it
 
     w_1^2 >= 4 / (J sum of 1/k_i),
 
-reached with J/2 at each end and nothing between. No choice of inertias gives a lower first mode.
+reached with J/2 at each end and nothing between. No choice of inertias gives a lower first mode. The first n modes are
+at most w_n, so n/w_n^2 is at most the sum as well: mode n is at least sqrt(n) times this bound.
 """
 
 from __future__ import annotations
@@ -31,6 +32,30 @@ def twist(torque: float, stiffness: float) -> float:
     """Static twist of a spring under a torque (N·m), rad; thesis 4.5."""
     all_positive("flexibility", "stiffness", (stiffness,), "N·m/rad")
     return torque / stiffness
+
+
+def shaft_stiffness(diameter: float, length: float, shear_modulus: float, bore: float = 0.0) -> float:
+    """Torsional stiffness of a round shaft, G pi (d^4 - b^4) / (32 L), N·m/rad.
+
+    Parameters
+    ----------
+    diameter, length, bore : float
+        m; the bore of a hollow shaft.
+    shear_modulus : float
+        Pa: 77e9 for stainless steel, 79e9 for steel, 26e9 for aluminium.
+
+    Raises
+    ------
+    ParameterError
+        If a number is not positive, or the bore is not smaller than the diameter.
+    """
+    all_positive("shaft", "diameter and length", (diameter, length), "m")
+    all_positive("shaft", "shear modulus", (shear_modulus,), "Pa")
+    if not 0.0 <= bore < diameter:
+        raise ParameterError(
+            f"shaft: bore = {bore:g} m must be 0 or more and below the diameter, {diameter:g} m"
+        )
+    return shear_modulus * math.pi * (diameter**4 - bore**4) / (32.0 * length)
 
 
 def lowest_first_mode(stiffness: Sequence[float], total: float) -> float:
@@ -66,11 +91,11 @@ class Flexibility:
     chain, modes : Chain and Modes, or None
         Where the inertias were given.
     claimed : tuple of float
-        First modes that someone states, Hz.
-    far : tuple of float
-        For every claimed one: the last inertia if it is that inertia's frequency with the rest held, kg·m².
-    true_first : tuple of float
-        The first mode of the free drivetrain with that last inertia, the rest undivided, Hz; NaN where it exceeds the
+        Elastic modes that someone states, first, second and so on, Hz.
+    far : float or None
+        The last inertia if the first claimed mode is that inertia's frequency with the rest held, kg·m².
+    true_first : float or None
+        The first mode of the free drivetrain with that last inertia, the rest undivided, Hz; NaN if it exceeds the
         total.
     """
 
@@ -82,8 +107,8 @@ class Flexibility:
     chain: Chain | None
     modes: Modes | None
     claimed: tuple[float, ...]
-    far: tuple[float, ...]
-    true_first: tuple[float, ...]
+    far: float | None
+    true_first: float | None
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -105,13 +130,21 @@ class Flexibility:
             parts = ", ".join(f"{x:.4g}" for x in self.chain.inertias)
             listed = ", ".join(f"{f:.4g}" for f in self.modes.frequencies)
             out.append(f"inertias {parts} kg·m²: modes at {listed} Hz")
-        for claim, far, true in zip(self.claimed, self.far, self.true_first, strict=True):
-            out.append(self._verdict(claim, far, true))
+        for order, claim in enumerate(self.claimed, 1):
+            out.append(self._verdict(order, claim))
         return out
 
-    def _verdict(self, claim: float, far: float, true: float) -> str:
-        if claim >= self.floor:
-            return f"a first mode at {claim:g} Hz is possible"
+    def lowest(self, order: int) -> float:
+        """The lowest frequency that an elastic mode (1: the first) can have with any inertias of this total, Hz."""
+        return math.sqrt(order) * self.floor
+
+    def _verdict(self, order: int, claim: float) -> str:
+        word = ("first", "second", "third", "fourth")[order - 1] if order < 5 else f"{order}th"
+        if claim >= self.lowest(order):
+            return f"a {word} mode at {claim:g} Hz is possible"
+        if order > 1 or self.far is None or self.true_first is None:
+            return f"a {word} mode at {claim:g} Hz is impossible: it is at least {self.lowest(order):.1f} Hz"
+        far, true = self.far, self.true_first
         held = f"{far:.4g} kg·m² behind the last spring oscillates at {claim:g} Hz with the rest held"
         if math.isnan(true):
             return (
@@ -143,26 +176,31 @@ def flexibility(
     inertias : sequence of float, optional
         How the total is divided, kg·m².
     claimed : sequence of float, optional
-        First modes to judge, Hz.
+        Elastic modes of one drivetrain to judge, Hz: the first, the second, and so on, at most one for each spring.
 
     Raises
     ------
     ParameterError
     """
     all_positive("flexibility", "inertia", (inertia,), "kg·m²")
-    all_positive("flexibility", "first mode", claimed, "Hz")
+    all_positive("flexibility", "mode", claimed, "Hz")
+    if list(claimed) != sorted(claimed) or len(claimed) > len(stiffness):
+        raise ParameterError(
+            f"flexibility: modes {', '.join(f'{f:g}' for f in claimed)} Hz must ascend, at most one for each of "
+            f"{len(stiffness)} springs; judge alternatives one at a time"
+        )
     chain = Chain(tuple(inertias), tuple(stiffness)) if inertias else None
     if chain and abs(chain.total - inertia) > 0.01 * inertia:
         raise ParameterError(
             f"flexibility: the inertias add up to {chain.total:.5g} kg·m², the whole is {inertia:.5g}; give parts of it"
         )
     given = torques or {}
-    far = tuple(far_inertia(stiffness[-1], f) for f in claimed)
+    far = far_inertia(stiffness[-1], claimed[0]) if claimed else None
     return Flexibility(
         tuple(stiffness), inertia, dict(given),
         {name: tuple(twist(t, k) for k in stiffness) for name, t in given.items()},
         lowest_first_mode(stiffness, inertia), chain, chain.modes() if chain else None,
-        tuple(claimed), far, tuple(_free_first(stiffness[-1], inertia, last) for last in far),
+        tuple(claimed), far, None if far is None else _free_first(stiffness[-1], inertia, far),
     )  # fmt: skip
 
 

@@ -27,7 +27,9 @@ class Repeated:
     time : array, shape (n,)
         s, from the start of every run.
     runs : array, shape (m, n)
-        The channel of every run.
+        The channel of every run; positions from the start of its reference, if there is one.
+    starts : array, shape (m,)
+        The positions at which the references start; zeros without a reference and for other channels.
     mean, spread, low, high : array, shape (n,)
         Over the runs, at every time: mean, standard deviation (of a sample of m), least, greatest.
     """
@@ -37,6 +39,7 @@ class Repeated:
     unit: str
     time: Array
     runs: Array
+    starts: Array
     mean: Array
     spread: Array
     low: Array
@@ -71,15 +74,19 @@ class Repeated:
         return {
             "controller": self.name, "channel": self.channel, "unit": self.unit, "runs": len(self.runs),
             "rms_spread": self.rms_spread, "greatest_range": self.greatest_range, "relative": self.relative,
-            "least_correlation": self.alikeness,
+            "least_correlation": self.alikeness, "range_of_starts": float(np.ptp(self.starts)),
         }  # fmt: skip
 
     def lines(self) -> list[str]:
         """What people read."""
+        apart = float(np.ptp(self.starts))
+        starts = (
+            f"; each from its own start, and these lie within {apart:.3g} {self.unit}" if apart > 0.0 else ""
+        )
         return [
             f"{self.name}: {len(self.runs)} runs, {self.channel}: spread {self.rms_spread:.3g} {self.unit} RMS "
             f"({100 * self.relative:.3g} % of the amplitude), greatest range {self.greatest_range:.3g} {self.unit}, "
-            f"least correlation {self.alikeness:.4f}"
+            f"least correlation {self.alikeness:.4f}{starts}"
         ]
 
 
@@ -89,8 +96,8 @@ def repeatability(groups: Mapping[str, Sequence[Record]], channel: str = "positi
     Parameters
     ----------
     groups : mapping of str to sequence of Record
-        Runs of the same motion, by controller; at least two each. Each run counts from its own first sample; what all
-        of a group have in common in length is compared.
+        Runs of the same motion, by controller; at least two each. Times count from the start of each run, positions
+        from the start of its reference, if there is one. The length that the runs have in common is compared.
     channel : str
         As for `stickslip.analyse.spectrum.spectrum`.
 
@@ -114,11 +121,19 @@ def _repeated(name: str, records: Sequence[Record], channel: str) -> Repeated:
         raise InputError(f"repeatability: the runs of {name!r} have no length; check their times")
     time = np.arange(math.floor(length / spacing * (1.0 + 1e-9)) + 1, dtype=np.float64) * spacing
     signals = [channel_of(record, channel) for record in records]
+    starts = np.array([_start_of(record, channel) for record in records])
     runs = np.array([np.interp(time, c, values) for c, (values, _) in zip(clocks, signals, strict=True)])
+    runs -= starts[:, None]
     if not np.all(np.isfinite(runs)):
         raise InputError(f"repeatability: {channel} of {name!r} has gaps; check the records")
     spread: Array = np.asarray(runs.std(axis=0, ddof=1), dtype=np.float64)
     mean = np.asarray(runs.mean(axis=0), dtype=np.float64)
     return Repeated(
-        name, channel, signals[0][1], time, runs, mean, spread, runs.min(axis=0), runs.max(axis=0)
+        name, channel, signals[0][1], time, runs, starts, mean, spread, runs.min(axis=0), runs.max(axis=0)
     )  # fmt: skip
+
+
+def _start_of(record: Record, channel: str) -> float:
+    """Return the commanded start from which a run's positions count; 0 if the record has no reference."""
+    counts = channel in ("position", "position_reference") and "position_reference" in record.channels
+    return float(record["position_reference"][0]) if counts else 0.0

@@ -1,11 +1,12 @@
-"""Analyse records and machines: spectrum, repeatability, flexibility, motor and sensor side, position, stability.
+"""Analyse records, machines and models: spectrum, repeatability, flexibility, sides, position, stability, attraction.
 
 stickslip analyse spectrum run.npz --mode "elastic mode=335" --plot spectrum.png
 stickslip analyse repeatability PID=1.npz PID=2.npz LuGre=3.npz LuGre=4.npz
-stickslip analyse flexibility --stiffness 17800,396 --inertia 4.2757e-4 --torque dry=0.2951 --claimed 270
+stickslip analyse flexibility --stiffness 17800,396 --inertia 4.2757e-4 --torque dry=0.2951 --claimed 270,2750
 stickslip analyse sides slow.npz fast.npz
 stickslip analyse position slow.npz --channel sensor_torque
 stickslip analyse stability --rig thesis-dry --linear PD --bandwidth 36 --plot map.png
+stickslip analyse attraction gms.toml --plot responses.png
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ from stickslip.cli import _files, _reading, _stability
 if TYPE_CHECKING:
     from stickslip.record import Record
 
-SUMMARY = "analyse records and machines: spectrum, repeatability, flexibility, sides, position, stability"
+SUMMARY = (
+    "analyse records, machines and models: spectrum, repeatability, flexibility, sides, position, stability"
+)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -160,7 +163,7 @@ def _repeatability(args: argparse.Namespace) -> None:
 
 def _flexibility_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--stiffness", required=True, metavar="K1,K2", help="spring stiffnesses, motor first, N·m/rad"
+        "--stiffness", default="", metavar="K1,K2", help="spring stiffnesses, motor first, N·m/rad"
     )
     parser.add_argument(
         "--inertia", required=True, metavar="J or J1,J2,J3", help="total inertia or its parts, kg·m²"
@@ -172,16 +175,33 @@ def _flexibility_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="[NAME=]NM",
         help="torque for the static twist; repeatable",
     )
-    parser.add_argument("--claimed", metavar="F1,F2", help="claimed first modes to check, Hz")
+    parser.add_argument(
+        "--shaft", action="append", default=[], metavar="D,L,G",
+        help="round shaft after the springs of --stiffness: diameter and length (m), shear modulus (Pa); repeatable",
+    )  # fmt: skip
+    parser.add_argument(
+        "--claimed", metavar="F1,F2", help="claimed elastic modes to check, first and second, Hz"
+    )
 
 
 def _flexibility(args: argparse.Namespace) -> None:
-    from stickslip.analyse.flexibility import flexibility
+    from stickslip.analyse.flexibility import flexibility, shaft_stiffness
     from stickslip.config import listed_numbers, named_numbers
+    from stickslip.errors import InputError
 
+    springs = list(listed_numbers(args.stiffness, "--stiffness", "N·m/rad")) if args.stiffness else []
+    for text in args.shaft:
+        shaft = listed_numbers(text, "--shaft", "m, m, Pa")
+        if len(shaft) != 3:
+            raise InputError(
+                f"--shaft {text} must be diameter,length,shear modulus, such as 0.012,0.396,77e9"
+            )
+        springs.append(shaft_stiffness(*shaft))
+    if not springs:
+        raise InputError("analyse flexibility needs --stiffness K1,K2 or --shaft D,L,G")
     inertias = listed_numbers(args.inertia, "--inertia", "kg·m²")
     found = flexibility(
-        listed_numbers(args.stiffness, "--stiffness", "N·m/rad"), sum(inertias),
+        springs, sum(inertias),
         torques=named_numbers(args.torque, "--torque", "N·m", value="NM", nameless=True),
         inertias=inertias if len(inertias) > 1 else (),
         claimed=listed_numbers(args.claimed, "--claimed", "Hz") if args.claimed else (),
@@ -260,6 +280,41 @@ def _position(args: argparse.Namespace) -> None:
     _show(args, [found], picture)
 
 
+# ---- attraction parameter -----------------------------------------------------------------------------------------
+
+
+def _attraction_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "model", type=Path, metavar="MODEL.toml", help="GMS law with its elements and sliding curve"
+    )
+    parser.add_argument(
+        "--velocity", type=float, default=5.0, metavar="RAD/S", help="sudden velocity (default 5)"
+    )
+    parser.add_argument(
+        "--rise-time",
+        type=float,
+        default=1e-3,
+        metavar="S",
+        help="time in which it is reached (default 0.001)",
+    )
+
+
+def _attraction(args: argparse.Namespace) -> None:
+    from stickslip.identify.presliding.attraction import apply_overshoot_rule
+    from stickslip.model import Model
+
+    found = apply_overshoot_rule(
+        Model.from_file(args.model), velocity=args.velocity, rise_time=args.rise_time
+    )
+
+    def picture() -> Any:
+        from stickslip.report.analysis_pictures import picture_of_overshoot
+
+        return picture_of_overshoot(found)
+
+    _show(args, [found], picture)
+
+
 Arguments = Callable[[argparse.ArgumentParser], None]
 Work = Callable[[argparse.Namespace], None]
 ANALYSES: dict[str, tuple[str, Arguments, Work]] = {
@@ -271,5 +326,7 @@ ANALYSES: dict[str, tuple[str, Arguments, Work]] = {
     "sides": ("motor torque against sensor torque: bearing friction", _sides_arguments, _sides),
     "stability": ("stability of feedback compensation: margins over gain, sample time, filter",
                   _stability.arguments, lambda args: _stability.work(args, _show)),
+    "attraction": ("attraction parameter C of GMS: first response to a sudden velocity without overshoot",
+                   _attraction_arguments, _attraction),
     "position": ("torque against position and time while the axis slides", _position_arguments, _position),
 }  # fmt: skip

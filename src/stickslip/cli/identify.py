@@ -68,6 +68,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="number of GMS elements (presliding; 0: automatic)",
     )
     parser.add_argument(
+        "--shares",
+        choices=("free", "equal"),
+        default="free",
+        help="shares of the GMS elements (presliding; default free)",
+    )
+    parser.add_argument(
         "--threshold",
         type=float,
         metavar="V",
@@ -260,7 +266,8 @@ def options_of(args: argparse.Namespace) -> dict[str, Any]:
         "values": values_given({"--set": args.set, "--freeze": args.freeze, "--free": args.free}),
         "frozen": [p.partition("=")[0] for p in args.freeze], "free": [p.partition("=")[0] for p in args.free],
         "inertia": args.inertia,
-        "torque_channel": args.torque or "", "elements": args.elements, "threshold": args.threshold,
+        "torque_channel": args.torque or "", "elements": args.elements, "shares": args.shares,
+        "threshold": args.threshold,
         "loop": args.loop, "loop_output": args.loop_output, "inverse": args.inverse,
         "per_direction": args.per_direction, "pendulum": args.pendulum, "drive_gain": args.drive_gain,
         "resistance": args.resistance, "extra_torque": args.extra_torque or "", "torque_is": args.torque_is,

@@ -316,7 +316,7 @@ def _presliding(
             if done.passed:
                 break
         share *= 0.75
-    level = {**sliding, "fs": fs, "fc": fs, "sigma2": 0.0}
+    level = Model("stribeck_plain", {}, **{**sliding, "fs": fs, "fc": fs, "sigma2": 0.0})
     loop = Hysteresis.of(done.record, "motor_torque")
     found = identify_presliding(loop, level, elements=3, offset=True, inertia=j)
     found = with_stiffness(resolved(found, share * fs), done.record, resolution)
@@ -369,7 +369,7 @@ def _stickslip(
             crossed, amplitude = error, amplitude * 0.93
             continue
         try:
-            found = identify_lugre_dynamics(Response.of(done.record), j, sliding)
+            found = identify_lugre_dynamics(Response.of(done.record), j, Model("stribeck_plain", {}, **sliding))
         except InputError as error:
             course.add("stickslip", done, None, str(error).rstrip("."))
             return None, ()

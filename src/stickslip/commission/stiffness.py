@@ -13,16 +13,16 @@ import numpy as np
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.monte_carlo import WIDEST
-from stickslip.identify.presliding.attraction import largest_without_overshoot
+from stickslip.identify.presliding.attraction import apply_overshoot_rule
 from stickslip.model import Model
 from stickslip.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 
-SLOWEST, FASTEST, LAG = 1.0, 1e4, 5e-3
-"""N·m/s between which C is looked for, and the lag in s that stands in where none or all overshoot; the thesis's own
-values (Tables 9 and 10) are lags of 3.9 and 4.4 ms."""
+LAG = 5e-3
+"""s, of friction in sliding, if the rule of the thesis gives no C; its own values (Tables 9 and 10) are 3.9 and
+4.4 ms."""
 FIRST = 0.3
 """Of a swing of the torque, along which all elements still stick."""
 LEAST = 0.01
@@ -93,15 +93,11 @@ def joined_model(curve: Identification, stuck: Identification) -> tuple[Model, f
     }
     plain: dict[str, Any] = {k: listed(v) for k, v in values.items()}
     model = Model(curve.model.law, {}, **plain)
-    c, said = largest_without_overshoot(model, lower=SLOWEST, upper=FASTEST)
-    if not SLOWEST < c < FASTEST:
-        which = (
-            f"No C overshoots up to {FASTEST:g}" if c >= FASTEST else f"Every C overshoots from {SLOWEST:g}"
-        )
+    rule = apply_overshoot_rule(model)
+    c, said = rule.c, ()
+    if c is None:
         c = math.fsum(springs.alpha) * stuck_level(stuck) / LAG
-        said = (
-            f"{which} N·m/s, so that the rule of thesis 4.3.1.1.5 gives none: C is that of a lag of {1e3 * LAG:g} ms.",
-        )
+        said = (f"By thesis 4.3.1.1.5, {rule.sentence}. C is that of a lag of {1e3 * LAG:g} ms.",)
     return Model(curve.model.law, {}, **{**plain, "c": c}), math.fsum(springs.k), said
 
 

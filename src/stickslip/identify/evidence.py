@@ -29,11 +29,6 @@ CHANGE = 1e-4
 """Relative change of a parameter that shows its effect."""
 
 
-def torque_limits(vector: Vector, largest: float) -> dict[str, tuple[float, float]]:
-    """Bounds of the search: no part of friction that is a positive torque exceeds the largest torque, N·m."""
-    return {p.name: (0.0, largest) for p in vector.free if p.par.unit == "N·m" and p.par.positive}
-
-
 def bend_limits(vector: Vector, speeds: Array) -> dict[str, tuple[float, float]]:
     """Bounds of the search for what bends the sliding curve: its velocities and its shape.
 

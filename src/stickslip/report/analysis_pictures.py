@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from stickslip.analyse.flexibility import Flexibility
 from stickslip.analyse.motor_vs_sensor import Sides
 from stickslip.analyse.repeatability import Repeated
 from stickslip.analyse.spectrum import Spectrum
+from stickslip.identify.presliding.attraction import OvershootRule
 from stickslip.machines.drivetrain import Chain
 from stickslip.report.plots import Curve, Panel, envelope, save, scaled
 from stickslip.report.styles import Style
@@ -32,6 +34,8 @@ DASHED = (
     Style("#7f7f7f", (0, (3, 1, 1, 1, 1, 1))),
 )  # fmt: skip
 LINES = (MAIN, OTHER, *DASHED[1:])
+SHOWN = 50.0
+"""ms of a response to a sudden velocity."""
 SHARES = np.linspace(0.02, 0.98, 97)
 SPLITS = {"the rest at the motor": 0.001, "the rest in the middle": 0.999}
 
@@ -121,7 +125,7 @@ def picture_of_dependence(found: Dependence) -> Drawn:
     speeds = np.abs([p.velocity for p in found.passes])
     if len({p.time for p in found.passes}) > 2 and np.ptp(speeds) < 0.02 * float(np.mean(speeds)):
         panels.append(Panel([*_means(found)], "mean (N·m)", "time (s)"))
-        message += f"; the mean changes by {100.0 * found.drift:.2g} %"
+        message += f"; the mean changes by {100.0 * found.drift:.2g} % in one direction"
     return "Torque against position", message, panels, 2.4 if len(panels) == 1 else 2.0
 
 
@@ -153,6 +157,29 @@ def picture_of_sides(found: Sides) -> Drawn:
     return "Motor side and sensor side", message, (top, below), 1.8
 
 
+def picture_of_overshoot(found: OvershootRule) -> Drawn:
+    """Responses of GMS to a sudden velocity for several C (thesis figures 4.14, 4.38), and the overshoot over C."""
+    drawn: dict[float, str] = dict.fromkeys(found.values[:: found.values.size // 2].tolist(), "")
+    drawn[float(found.model.parameters.c)] = "of the model"
+    if found.c is not None:
+        drawn[found.c] = "first without overshoot"
+    steady = found.model.sliding_torque(found.velocity)
+    curves: list[Curve] = []
+    for (c, word), style in zip(sorted(drawn.items()), itertools.cycle(LINES)):
+        time, torque = found.response(c)
+        curves.append(Curve(1e3 * time, torque, f"C = {c:.4g} N·m/s{f', {word}' if word else ''}", style))
+    curves.append(Curve(np.array([0.0, SHOWN]), np.full(2, steady), "steady", BOUND))
+    limits = 0.9 * steady, max(1.05 * float(curve.y.max()) for curve in curves)
+    top = 110.0 * max(float(found.overshoot.max()), 0.01)
+    panels = (
+        Panel(curves, "friction torque (N·m)", "time (ms)", (0.0, SHOWN), limits),
+        Panel([Curve(found.values, 100.0 * found.overshoot, "overshoot", Style("#000000", "-", 1.3))],
+              "overshoot (%)", "C (N·m/s)", (float(found.values[0]), float(found.values[-1])), (0.0, top),
+              x_scale="log"),
+    )  # fmt: skip
+    return f"Response of GMS to a sudden {found.velocity:g} rad/s", found.sentence, panels, 2.6
+
+
 def picture_of_flexibility(found: Flexibility) -> Drawn:
     """First mode over the share of the last inertia: however the rest is divided, none goes below the bound."""
     curves: list[Curve] = []
@@ -176,11 +203,13 @@ def picture_of_flexibility(found: Flexibility) -> Drawn:
         Curve(ends, np.full(2, found.floor), f"lowest possible, {found.floor:.0f} Hz", Style("#000000", "-", 1.6))
     )  # fmt: skip
     curves += [
-        Curve(ends, np.full(2, f), f"stated, {f:.0f} Hz", Style(DASHED[i].colour, BOUND.dashes, 1.4))
-        for i, f in enumerate(found.claimed)
+        Curve(
+            ends, np.full(2, f), f"stated first mode, {f:.0f} Hz", Style(DASHED[0].colour, BOUND.dashes, 1.4)
+        )
+        for f in found.claimed[:1]
     ]
     top = 2.5 * found.floor
-    impossible = [f for f in found.claimed if f < found.floor]
+    impossible = [f for i, f in enumerate(found.claimed, 1) if f < found.lowest(i)]
     what = " and ".join(f"{f:g} Hz" for f in impossible)
     message = f"no division of {found.inertia:.4g} kg·m² puts the first mode below {found.floor:.0f} Hz" + (
         f"; {what}: impossible" if impossible else ""

@@ -14,6 +14,7 @@ import numpy as np
 
 from stickslip import plugins
 from stickslip.arguments import arguments_checked
+from stickslip.config import read_toml
 from stickslip.control.own_loop import ReferenceVelocity, loop_text
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
@@ -36,6 +37,7 @@ from stickslip.report.identified import Source
 from stickslip.spec import Law
 from stickslip.values import same
 from stickslip.verbs.examiner import Examiner
+from stickslip.verbs.export_notes import constant_torque
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.reading import ARRAYS, Log, Reading, beside_of, named, open_log
 
@@ -61,6 +63,7 @@ def identify(
     noise: float | None = None,
     torque_channel: str = "",
     elements: int = 0,
+    shares: Literal["free", "equal"] = "free",
     threshold: float | None = None,
     loop: Loops = None,
     loop_output: Literal["torque", "current", "voltage"] | None = None,
@@ -112,6 +115,8 @@ def identify(
         "motor_torque", "sensor_torque", ...: which one, of several (not axis).
     elements : int
         Of GMS (presliding); 0: chosen.
+    shares : {"free", "equal"}
+        Of the elements in the sliding curve: fitted, or all the same (presliding).
     threshold : float, optional
         Velocity that is motion, rad/s or m/s (breakaway); 0.01.
     loop : str or mapping, or a sequence of them, optional
@@ -167,13 +172,13 @@ def identify(
     kind = method_named(method)
     estimate = SlidingMemo()
     laws, left_out = laws_of(law)
+    known_model, model_offset = model_and_offset(model)
     known = dict(values or {}) | ({} if inertia is None else {"inertia": inertia})
     options = Options(
         laws, known, (*frozen, *(["inertia"] if inertia is not None and method == "axis" else [])), tuple(free),
-        model if model is None or isinstance(model, Model) else Model.from_file(model), noise, torque_channel, elements,
-        threshold, 0, inverse, per_direction, pendulum, drive_gain, reading.get("torque_constant"), resistance,
-        loop_output, extra_torque, torque_is, delay, harmonics, load, intervals, robust, estimate, progress,
-        position_map, reading.get("force_constant"),
+        known_model, noise, torque_channel, elements, threshold, 0, inverse, per_direction, pendulum, drive_gain,
+        reading.get("torque_constant"), resistance, loop_output, extra_torque, torque_is, delay, harmonics,
+        load, intervals, robust, estimate, progress, position_map, reading.get("force_constant"), shares, model_offset,
     )  # fmt: skip
     given = given_in(options, inertia=inertia is not None, loop=bool(loop), hold_out=bool(_listed(hold_out)))
     kind.refuse_unused(given, methods_by_option())
@@ -200,6 +205,14 @@ def identify(
     found = with_notes(identified(kind, sources, options), kind, records, options, left_out)
     found = replace(found, findings=tuple(f for s in sources for f in s.findings))
     return IdentificationResult(found, tuple(sources), law_file(found, () if inverse else laws))
+
+
+def model_and_offset(model: Model | str | os.PathLike[str] | None) -> tuple[Model | None, float]:
+    """Return the model given or read from a file, and the constant torque that the file holds, N·m."""
+    if model is None or isinstance(model, Model):
+        return model, 0.0
+    content = read_toml(Path(model))
+    return Model.from_table(content), constant_torque(content)
 
 
 def refuse_same(sources: Sequence[Source]) -> None:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
+from stickslip import plugins
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.experiment import TORQUES
 from stickslip.identify.methods.method import Options
+from stickslip.model import Model
 from stickslip.record import Record
 
 MOTORS = ("torque_constant", "force_constant")
-CURVE = ("fs", "fc", "vs", "delta_s", "sigma2")
 
 
 def torque_channel(records: Sequence[Record], options: Options, method: str) -> str:
@@ -85,20 +87,43 @@ def has_torque(method: str) -> Callable[[Sequence[Record], Options], None]:
     return check
 
 
-def curve_values(options: Options, method: str) -> Mapping[str, float]:
-    """Parameters of the sliding curve from the model and the values given."""
-    found: dict[str, float] = {}
-    if options.model is not None:
-        known = options.model.parameters
-        found = {n: float(getattr(known, n)) for n in CURVE if hasattr(known, n)}
-    found |= {k: v for k, v in options.values.items() if k in CURVE}
-    missing = [n for n in ("fs", "fc", "vs") if n not in found]
-    if missing:
+def known_curve(options: Options, method: str, own: Sequence[str]) -> Model:
+    """Return the sliding curve known before: the model given, or Stribeck's, with the values given.
+
+    Parameters
+    ----------
+    options : Options
+    method : str
+    own : sequence of str
+        Names of values that do not belong to the curve.
+
+    Raises
+    ------
+    InputError, UnknownName
+        If parameters of the curve are missing, or a value belongs to neither.
+    """
+    law = plugins.law("stribeck_plain") if options.model is None else options.model.law
+    values: dict[str, Any] = {} if options.model is None else options.model.parameters._asdict()
+    given = {name: value for name, value in options.values.items() if name not in own}
+    known = [f.name for f in law.fields if not f.per_element]
+    for name in given:
+        if name not in known:
+            raise UnknownName(f"value for --method {method}", name, [*own, *known])
+    missing = [f.name for f in law.fields if f.name not in {**values, **given} and f.par.default is None]
+    if options.model is None and {"fs", "fc", "vs"} & set(missing):
         raise InputError(
             f"--method {method} needs the sliding curve, which lacks {', '.join(missing)}; identify it with "
             "--method sliding and give --model model.toml, or --set fs=..,  --set fc=.. and --set vs=.."
         )
-    return {"delta_s": 2.0, "sigma2": 0.0} | found
+    return Model(law, {}, **{**values, **given})
+
+
+def without_constant_torque(record: Record, channel: str, options: Options) -> Record:
+    """Return a record without the known constant torque: the value ``offset``, or that of the model's file."""
+    offset = options.values.get("offset", options.model_offset)
+    return (
+        replace(record, channels={**record.channels, channel: record[channel] - offset}) if offset else record
+    )
 
 
 def single(records: Sequence[Record], method: str) -> Record:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
-from stickslip.identify.methods._records import has_torque, single, with_torque
+from stickslip.identify.methods._records import has_torque, single, with_torque, without_constant_torque
 from stickslip.identify.methods.method import TORQUE, Method, Options
 from stickslip.identify.presliding.attraction import identify_attraction
 from stickslip.identify.presliding.hysteresis import Loop
@@ -24,7 +24,7 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     if "velocity" not in record.channels:
         raise InputError("--method attraction needs the velocity; map a column with --map velocity=COLUMN")
     (record,), channel = with_torque([record], options, "attraction")
-    loop = Loop.of(record, channel, "velocity")
+    loop = Loop.of(without_constant_torque(record, channel, options), channel, "velocity")
     return identify_attraction(loop, model, noise=options.noise)
 
 

@@ -6,10 +6,19 @@ from collections.abc import Sequence
 
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification
-from stickslip.identify.methods._records import CURVE, curve_values, has_torque, single, with_torque
+from stickslip.identify.methods._records import (
+    has_torque,
+    known_curve,
+    single,
+    with_torque,
+    without_constant_torque,
+)
 from stickslip.identify.methods.method import TORQUE, Method, Options
 from stickslip.identify.presliding.lugre_dynamics import Response, identify_lugre_dynamics
 from stickslip.record import Record
+
+OWN = ("inertia", "offset")
+"""Values that do not belong to the sliding curve."""
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
@@ -17,9 +26,9 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     record = single(records, "lugre")
     if "inertia" not in options.values:
         raise InputError("--method lugre needs the inertia in kg·m²; give --set inertia=...")
+    curve = known_curve(options, "lugre", OWN)
     (record,), channel = with_torque([record], options, "lugre")
-    response = Response.of(record, channel)
-    curve = curve_values(options, "lugre")
+    response = Response.of(without_constant_torque(record, channel, options), channel)
     return identify_lugre_dynamics(response, options.values["inertia"], curve, noise=options.noise)
 
 
@@ -29,5 +38,4 @@ METHOD = Method(
     identify,
     has_torque("lugre"),
     uses=TORQUE | {"values", "inertia", "model", "noise"},
-    values=(*CURVE, "inertia"),
 )

@@ -30,13 +30,15 @@ class Options:
     ----------
     laws : tuple of str or Law
         Names, paths of law files, or laws; empty: the method's own candidates.
-    values, frozen, free, model, noise, elements, threshold, inverse, per_direction, pendulum, drive_gain, resistance, \
-    loop_output, extra_torque, torque_is, delay, harmonics, position_map, load, intervals, robust
+    values, frozen, free, model, noise, elements, shares, threshold, inverse, per_direction, pendulum, drive_gain, \
+    resistance, loop_output, extra_torque, torque_is, delay, harmonics, position_map, load, intervals, robust
         As of `stickslip.verbs.identify.identify`, which says what each is, with its unit.
     torque : str
         Channel of the torque; empty: the first known one. Not for the method `axis`.
     held_out : int
         How many of the records, the last ones, are not fitted but judge the result (axis).
+    model_offset : float
+        Constant torque in the file of the model, N·m.
     torque_constant, force_constant : float or None
         N·m/A of a motor that turns, N/A of a linear one.
     estimate : callable
@@ -73,6 +75,8 @@ class Options:
     progress: Callable[[str], None] = silent
     position_map: bool = False
     force_constant: float | None = None
+    shares: Literal["free", "equal"] = "free"
+    model_offset: float = 0.0
 
     def __post_init__(self) -> None:
         for option, count in (("harmonics", self.harmonics), ("elements", self.elements)):
@@ -96,7 +100,7 @@ OWN_FLAGS = {
     "laws": "law", "values": "set", "frozen": "freeze", "held_out": "hold-out", "position_map": "position",
 }  # fmt: skip
 """Options whose name on the command line is another than that of their field."""
-OF_EVERY_METHOD = ("torque_constant", "force_constant", "estimate", "progress")
+OF_EVERY_METHOD = ("torque_constant", "force_constant", "model_offset", "estimate", "progress")
 """Fields that no method refuses: how a log is read, and how it is computed."""
 AXIS = frozenset({"pendulum", "drive_gain", "resistance", "loop", "loop_output", "extra_torque"})
 """Options that turn a record into an experiment of an axis."""

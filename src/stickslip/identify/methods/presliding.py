@@ -5,20 +5,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from stickslip.identify.estimate import Identification
-from stickslip.identify.methods._records import CURVE, curve_values, has_torque, single, with_torque
+from stickslip.identify.methods._records import (
+    has_torque,
+    known_curve,
+    single,
+    with_torque,
+    without_constant_torque,
+)
 from stickslip.identify.methods.method import TORQUE, Method, Options
 from stickslip.identify.presliding.hysteresis import Loop
 from stickslip.identify.presliding.presliding import identify_presliding
 from stickslip.record import Record
 
+OWN = ("inertia", "offset")
+"""Values that do not belong to the sliding curve."""
+
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """Elements from the loops of one record; the inertia is among the values where it is known."""
     (record,), channel = with_torque([single(records, "presliding")], options, "presliding")
-    loop = Loop.of(record, channel)
+    curve = known_curve(options, "presliding", OWN)
     return identify_presliding(
-        loop, curve_values(options, "presliding"), elements=options.elements, noise=options.noise,
-        inertia=options.values.get("inertia", 0.0),
+        Loop.of(without_constant_torque(record, channel, options), channel), curve, elements=options.elements,
+        shares=options.shares, noise=options.noise, inertia=options.values.get("inertia", 0.0),
     )  # fmt: skip
 
 
@@ -27,6 +36,5 @@ METHOD = Method(
     "GMS elements from pre-sliding loops",
     identify,
     has_torque("presliding"),
-    uses=TORQUE | {"values", "inertia", "model", "noise", "elements"},
-    values=(*CURVE, "inertia"),
+    uses=TORQUE | {"values", "inertia", "model", "noise", "elements", "shares"},
 )

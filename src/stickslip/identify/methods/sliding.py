@@ -15,7 +15,7 @@ from stickslip.identify.fit.axis_start import each_way, frozen_by_default, start
 from stickslip.identify.methods._coasting import coasting_points
 from stickslip.identify.methods._records import has_torque, with_torque
 from stickslip.identify.methods.method import TORQUE, Method, Options, law_of, refuse_unsaid
-from stickslip.identify.sliding.choice import candidates, choose_sliding, comparable
+from stickslip.identify.sliding.choice import candidates, choose_sliding, comparable, each_direction
 from stickslip.identify.sliding.curve import Array, identify_sliding
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.identify.sliding.segments import sliding_points
@@ -29,8 +29,6 @@ PER_DIRECTION = "Friction of each direction includes any constant torque: --per-
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
     """Fit the laws named, or the curves of the thesis, together with a constant torque; choose one of several."""
-    if options.per_direction and not options.laws:
-        raise InputError("--method sliding --per-direction needs a law; name one, such as --law coulomb")
     measured, notes = measured_points(records, options)
     points = replace(measured, offset=known_offset(measured, options))
     if options.laws:
@@ -39,6 +37,7 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
         templates = {law.name: template(law, points.velocity, points.torque, options) for law in laws}
     else:
         every = candidates(points.velocity, points.torque, dict(options.values))
+        every = {name: each_direction(m) for name, m in every.items()} if options.per_direction else every
         templates = comparable(points, every)
         notes = (*notes, FEW) if len(templates) < len(every) else notes
     refuse_unknown(options, templates.values())

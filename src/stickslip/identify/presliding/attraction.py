@@ -1,12 +1,14 @@
 """The attraction parameter C of GMS: how fast its elements follow the sliding curve.
 
 From a velocity that varies within the Stribeck region without reversing (thesis 3.1.3.2.4.2, eq. 3.22), where friction
-lags behind s(v); or, where no such lag can be measured, as the largest C whose response to a sudden velocity of 5 rad/s
-does not overshoot (4.3.1.1.5).
+lags behind s(v). If no such lag can be measured, from the law alone: the first C whose response to a sudden velocity of
+5 rad/s does not overshoot (4.3.1.1.5).
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,10 +28,15 @@ FASTER = (
 )
 SKIPPED = 0.2
 """Part of the record left out at its start: the transient from rest."""
-SUDDEN = (5.0, 1e-3, 0.2)
-"""A velocity that is reached within one time step, how long that is and the response, rad/s, s, s."""
+SUDDEN, RISE, DURATION = 5.0, 1e-3, 0.2
+"""A velocity, rad/s, the time in which it is reached, one sample of the thesis's controller, and the response, s."""
+WITHIN, AFTER = 100, 1000
+"""Steps of the rise and of the rest of a response: ten times as many change an overshoot by less than 1e-5 of the
+torque, while a single step of the rise makes an overshoot of 1.6 % one of 26 % (thesis Table 10)."""
 OVERSHOOT = 1e-3
-"""Part of the steady torque beyond which a response overshoots."""
+"""Part of the steady torque beyond which a response overshoots: less than a line's width in figures 4.14 and 4.38."""
+LEAST, MOST, PER_DECADE = 1.0, 1e4, 4
+"""N·m/s, the range in which C is searched, and values of C per decade at which the overshoot is computed."""
 
 
 def identify_attraction(loop: Loop, template: Model, *, noise: Noise | float | None = None) -> Identification:
@@ -86,53 +93,121 @@ def identify_attraction(loop: Loop, template: Model, *, noise: Noise | float | N
     )  # fmt: skip
 
 
-def response_to_velocity(
-    model: Model, velocity: float, time_step: float, duration: float
-) -> tuple[Array, Array]:
-    """Time and torque of a contact at rest that is suddenly moved at a velocity, sampled as a drive would."""
-    time: Array = time_step * np.arange(0.0, round(duration / time_step) + 1.0)
-    ramp = np.minimum(time / time_step, 1.0) * velocity
-    position = np.concatenate([[0.0], np.cumsum(0.5 * (ramp[1:] + ramp[:-1]) * time_step)])
-    return time, Along(model.law, time, position, ramp).of(model)
+@dataclass(frozen=True, eq=False)
+class OvershootRule:
+    """What the rule of thesis 4.3.1.1.5 gives for a law: `apply_overshoot_rule` fills it.
+
+    Attributes
+    ----------
+    model : Model
+        The GMS law.
+    velocity, rise_time : float
+        The sudden velocity, rad/s, and the time in which it is reached, s.
+    c : float or None
+        The first C without overshoot, N·m/s; None if there is no such C, or if it is any.
+    values, overshoot : array, shape (n,)
+        C, N·m/s, ascending, and the overshoot there, as part of the steady torque.
+    """
+
+    model: Model
+    velocity: float
+    rise_time: float
+    c: float | None
+    values: Array
+    overshoot: Array
+
+    @property
+    def sentence(self) -> str:
+        """The result in words."""
+        low, high = (f"{x:.5g}" for x in self.values[[0, -1]])
+        none = f"below {100.0 * OVERSHOOT:g} %"
+        first, last = (f"{100.0 * x:.2g} %" if x > OVERSHOOT else none for x in self.overshoot[[0, -1]])
+        trend = f"the overshoot is {first} at {low} and {last} at {high} N·m/s"
+        if self.c is not None:
+            return f"C = {self.c:.4g} N·m/s is the first without overshoot: {trend}"
+        if np.all(self.overshoot > OVERSHOOT):
+            return f"no C from {low} to {high} N·m/s qualifies: {trend}"
+        return f"the rule does not determine C: no C from {low} to {high} N·m/s overshoots"
+
+    def response(self, c: float) -> tuple[Array, Array]:
+        """Return time, s, and torque, N·m, with another C."""
+        return response_to_velocity(with_attraction(self.model, c), self.velocity, self.rise_time, DURATION)
+
+    def lines(self) -> list[str]:
+        """What people read."""
+        return [f"response to a sudden {self.velocity:g} rad/s: {self.sentence}"]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "velocity": self.velocity, "rise_time": self.rise_time, "c": self.c, "values": self.values.tolist(),
+            "overshoot": self.overshoot.tolist(), "sentence": self.sentence,
+        }  # fmt: skip
 
 
-def largest_without_overshoot(
-    template: Model, *, lower: float = 1.0, upper: float = 1e4
-) -> tuple[float, tuple[str, ...]]:
-    """The largest C whose response to a sudden velocity does not overshoot its steady torque (thesis 4.3.1.1.5).
+def apply_overshoot_rule(
+    model: Model,
+    *,
+    velocity: float = SUDDEN,
+    rise_time: float = RISE,
+    lower: float = LEAST,
+    upper: float = MOST,
+) -> OvershootRule:
+    """Find the first C whose response to a sudden velocity does not overshoot its steady torque (thesis 4.3.1.1.5).
+
+    The first is the limit between values of C that overshoot and values that do not, whether the overshoot falls with C
+    (friction that falls to this velocity) or grows.
 
     Parameters
     ----------
-    template : Model
-        A GMS law.
+    model : Model
+        A GMS law; its own C does not matter.
+    velocity, rise_time : float
+        rad/s, and the time in which it is reached, s. If it is reached at once, no C overshoots.
     lower, upper : float
-        Between which C is looked for, N·m/s.
+        Between which C is searched, N·m/s.
 
-    Returns
-    -------
-    c : float
-        N·m/s; `upper` where none overshoots.
-    notes : tuple of str
-        What the answer is worth.
+    Raises
+    ------
+    InputError
+        If it is another law, or a number is not positive.
     """
+    if model.law.name != "gms":
+        raise InputError(f"law {model.law.name!r} has no attraction parameter; give a GMS law")
+    if not (0.0 < velocity < math.inf and 0.0 < rise_time < DURATION and 0.0 < lower < upper):
+        raise InputError(
+            f"velocity = {velocity:g} rad/s and rise time = {rise_time:g} s must be greater than 0"
+        )
 
-    def overshoots(c: float) -> bool:
-        _, torque = response_to_velocity(
-            Model(template.law, {}, **{**template.parameters._asdict(), "c": c}), *SUDDEN
-        )
-        steady = abs(template.law.steady(SUDDEN[0], template.parameters)) if template.law.steady else 0.0
-        return float(np.max(np.abs(torque))) > (1.0 + OVERSHOOT) * steady
+    def overshoot(c: float) -> float:
+        _, torque = response_to_velocity(with_attraction(model, c), velocity, rise_time, DURATION)
+        return max(float(np.max(torque)) / model.sliding_torque(velocity) - 1.0, 0.0)
 
-    if overshoots(lower):
-        return lower, (
-            f"Even C = {lower:g} N·m/s overshoots: the elements break away above the curve at this velocity.",
-        )
-    if not overshoots(upper):
-        return upper, (
-            f"No C up to {upper:g} N·m/s overshoots: with its elements' break-away located inside the step, the law "
-            "meets the curve from below, so that this criterion does not determine C. Measure the lag instead.",
-        )
-    for _ in range(40):
-        middle = (lower * upper) ** 0.5
-        lower, upper = (lower, middle) if overshoots(middle) else (middle, upper)
-    return lower, ()
+    values = np.geomspace(lower, upper, math.ceil(PER_DECADE * math.log10(upper / lower)) + 1)
+    found = np.array([overshoot(c) for c in values.tolist()])
+    over = found > OVERSHOOT
+    changes = np.flatnonzero(over[1:] != over[:-1])
+    if not changes.size:
+        return OvershootRule(model, velocity, rise_time, None, values, found)
+    ends = values[changes[0] : changes[0] + 2].tolist()
+    good, bad = ends if over[changes[0] + 1] else ends[::-1]
+    while abs(good / bad - 1.0) > 1e-9:
+        middle = math.sqrt(good * bad)
+        good, bad = (good, middle) if overshoot(middle) > OVERSHOOT else (middle, bad)
+    return OvershootRule(model, velocity, rise_time, good, values, found)
+
+
+def with_attraction(model: Model, c: float) -> Model:
+    """Return a GMS law with another C, N·m/s."""
+    return Model(model.law, {}, **{**model.parameters._asdict(), "c": c})
+
+
+def response_to_velocity(
+    model: Model, velocity: float, rise_time: float, duration: float
+) -> tuple[Array, Array]:
+    """Return time, s, and torque, N·m, of a contact at rest that is moved at a velocity, reached at a steady rate."""
+    rise = np.linspace(0.0, rise_time, WITHIN + 1)
+    time = np.concatenate([rise, np.linspace(rise_time, duration, AFTER + 1)[1:]])
+    ramp = np.minimum(time / rise_time, 1.0) * velocity
+    position = np.concatenate([[0.0], np.cumsum(0.5 * (ramp[1:] + ramp[:-1]) * np.diff(time))])
+    return time, Along(model.law, time, position, ramp).of(model)

@@ -11,7 +11,7 @@ no law at all.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
 from stickslip.errors import InputError
+from stickslip.friction_levels import levels_of
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.fit.broyden import descend_by_secants
 from stickslip.identify.fit.levenberg_marquardt import Residuals, Squares
@@ -27,6 +28,7 @@ from stickslip.identify.fit.parallel import mapped
 from stickslip.identify.fit.parameter_vector import Vector
 from stickslip.identify.fit.uncertainty import Fit, fit
 from stickslip.identify.presliding.hysteresis import correlation_lags
+from stickslip.identify.presliding.known_curve import describe_unused, static_levels, transfer_curve
 from stickslip.identify.presliding.lugre_scan import plain_scan, plain_verdict, response_picture, scan_picture
 from stickslip.model import Model
 from stickslip.record import Record
@@ -136,14 +138,15 @@ def pseudo_inverse(matrix: Any) -> Any:
     return inverse(matrix)
 
 
-def lugre_vector(
-    sliding: Mapping[str, float], sigma0: float, sigma1: float, most: float = math.inf
-) -> Vector:
-    """LuGre with its sliding curve frozen, and sigma1 at most `most`."""
-    return Vector(
-        Model("lugre", {}, sigma0=sigma0, sigma1=sigma1, **sliding), free=["sigma0", "sigma1"],
-        limits={"sigma1": (0.0, most)},
-    )  # fmt: skip
+def lugre_vector(curve: Model, sigma0: float, sigma1: float, most: float = math.inf) -> Vector:
+    """LuGre with the sliding curve of another law, frozen, and sigma1 at most `most`."""
+    model = transfer_curve("lugre", curve, sigma0=sigma0, sigma1=sigma1)
+    return Vector(model, free=["sigma0", "sigma1"], limits={"sigma1": (0.0, most)})
+
+
+def stribeck_velocity(curve: Model) -> float:
+    """Return the smaller Stribeck velocity of both directions, rad/s."""
+    return min(levels_of(curve, direction).vs for direction in (1.0, -1.0))
 
 
 class Simulation:
@@ -229,7 +232,7 @@ def squares_of(vector: Vector, residuals: Residuals) -> Squares:
 
 
 def fit_position(
-    response: Response, inertia: float, sliding: Mapping[str, float], *, sigma0: float, sigma1: float,
+    response: Response, inertia: float, curve: Model, *, sigma0: float, sigma1: float,
     noise: Noise | float | None = None, profiles: bool = True,
 ) -> Fit:  # fmt: skip
     """Plain output error: least squares of the simulated position, all samples alike, where it starts left free.
@@ -237,7 +240,7 @@ def fit_position(
     Thesis 3.1.3.2.3.1, without the free start.
     Right where the friction is LuGre's; where it is not, see `identify_lugre_dynamics`.
     """
-    vector = lugre_vector(sliding, sigma0, sigma1)
+    vector, vs = lugre_vector(curve, sigma0, sigma1), stribeck_velocity(curve)
     rough = Simulation(response, vector, inertia, ROUGH)
     # sigma0 alone first: far from the minimum sigma1 would be driven to 0, which it leaves slowly.
     near, _ = descend_by_secants(
@@ -245,9 +248,9 @@ def fit_position(
     )  # fmt: skip
     enough = ENOUGH / response.time.size
     near, _ = descend_by_secants(
-        squares_of(vector, misfit(response, rough.graded(near, sliding["vs"]))), near, tolerance=enough
+        squares_of(vector, misfit(response, rough.graded(near, vs))), near, tolerance=enough
     )
-    residuals = misfit(response, rough.graded(near, sliding["vs"]))
+    residuals = misfit(response, rough.graded(near, vs))
     known, size = as_noise(noise), float(np.ptp(response.position))
     first = fit(
         residuals,
@@ -314,7 +317,7 @@ def left_open(found: Fit) -> list[str]:
 
 
 def identify_lugre_dynamics(
-    response: Response, inertia: float, sliding: Mapping[str, float], *, noise: Noise | float | None = None,
+    response: Response, inertia: float, curve: Model, *, noise: Noise | float | None = None,
 ) -> Identification:  # fmt: skip
     """Find sigma0 and sigma1 from an open-loop stick-slip response, its pre-sliding parts weighted for themselves.
 
@@ -323,8 +326,8 @@ def identify_lugre_dynamics(
     response : Response
     inertia : float
         kg·m²
-    sliding : mapping of str to float
-        Parameters of the sliding curve (fs, fc, vs, delta_s, sigma2), identified before.
+    curve : Model
+        Any law with the sliding curve, identified before: of any shape, symmetric or for each direction.
     noise : Noise or float, optional
         Standard deviation of a position, rad; else from the residual in the pre-sliding parts.
 
@@ -340,18 +343,18 @@ def identify_lugre_dynamics(
     InputError
         If the axis never sticks near zero torque.
     """
-    known = as_noise(noise)
-    stiffness = small_signal_stiffness(response, sliding["fs"], known)
+    known, fs = as_noise(noise), min(static_levels(curve))
+    stiffness = small_signal_stiffness(response, fs, known)
     begin = stiffness.value if math.isfinite(stiffness.value) else 1e4
     # Beyond critical damping bristles would be no springs; this record could not tell.
     critical = 2.0 * math.sqrt(begin * inertia)
-    vector = lugre_vector(sliding, begin, 0.1 * critical, critical)
+    vector = lugre_vector(curve, begin, 0.1 * critical, critical)
     simulation = Simulation(response, vector, inertia)
-    pieces = sticking_pieces(response, sliding["fs"])
-    found = fit_bristles(response, simulation, pieces, sliding["vs"], known)
+    pieces = sticking_pieces(response, fs)
+    found = fit_bristles(response, simulation, pieces, stribeck_velocity(curve), known)
     scan = plain_scan(response.position, simulation.position, found)
     decides, sentence = plain_verdict(scan, found.values["sigma0"])
-    simulated = simulation.position(found.u)
+    simulated, model = simulation.position(found.u), vector.model(found.u)
     next_steps = (
         ()
         if decides
@@ -360,12 +363,12 @@ def identify_lugre_dynamics(
     correlation = np.full((3, 3), math.nan)
     correlation[:2, :2], correlation[2, 2] = found.correlation, 1.0
     return Identification(
-        "lugre_dynamics", vector.model(found.u), (*found.estimates, stiffness), correlation,
+        "lugre_dynamics", model, (*found.estimates, stiffness), correlation,
         {
             "presliding_rms_rad": found.rms,
             "position_rms_rad": float(np.sqrt(np.mean((simulated - response.position) ** 2))),
         },
-        (sentence, *left_open(found)), next_steps,
+        (sentence, *left_open(found), *describe_unused(curve, model)), next_steps,
         (response_picture(response.time, response.position, simulated), scan_picture(scan, found.values["sigma0"])),
         {"scan": scan, "plain_determines_sigma0": decides, "pieces": len(pieces)},
     )  # fmt: skip

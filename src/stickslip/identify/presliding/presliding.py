@@ -12,7 +12,7 @@ from __future__ import annotations
 import importlib
 import itertools
 import math
-from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,8 @@ from stickslip.identify.presliding.hysteresis import (
     relative_error,
     turning_points,
 )
-from stickslip.identify.presliding.loop_doubt import doubted
+from stickslip.identify.presliding.known_curve import describe_unused, static_levels, transfer_curve
+from stickslip.identify.presliding.loop_uncertainty import add_systematic_errors
 from stickslip.model import Model
 from stickslip.simulation.prescribed.motion import Along
 
@@ -48,6 +49,8 @@ LAG, TURNED = 5e-3, 0.02
 turns a loop, rad, from which on it is fitted along."""
 RESOLVED = 0.005
 """Of the travel to either side, within which an element that slips shows a torque but no stiffness."""
+ATTRACTION = 24.0
+"""N·m/s, thesis Table 1."""
 ENOUGH = 1.1
 """Fewest elements whose loop error is within this factor of the best."""
 
@@ -102,28 +105,67 @@ def maxwell_start(loop: Loop, rows: Rows, elements: int) -> tuple[Array, Array]:
     return k, x
 
 
-def start_model(
-    loop: Loop, rows: Rows, elements: int, equal: bool, sliding: Mapping[str, float], c: float
-) -> Model:
-    """A GMS law whose elements come from the linear fit."""
-    k, x = maxwell_start(loop, rows, elements)
-    fs = sliding["fs"]
-    if equal:
-        stiffness = np.sum(k) * np.linspace(1.5, 0.5, elements) / elements
-        return Model("gms", {}, k=stiffness.tolist(), alpha=[1.0 / elements] * elements, c=c, **sliding)
-    level = np.maximum(k * x, 0.02 * fs)
-    # What the loop does not load to its limit takes up the rest of the static torque.
-    level[int(np.argmax(x))] += max(fs - float(np.sum(level)), 0.0)
-    return Model("gms", {}, k=k.tolist(), alpha=(level / np.sum(level)).tolist(), c=c, **sliding)
+@dataclass(frozen=True)
+class Setup:
+    """What a fit of elements holds and fits in addition to them.
+
+    Attributes
+    ----------
+    curve : Model
+        A law with the sliding curve.
+    equal : bool
+        Whether all elements have the same share of the curve.
+    c : float
+        Attraction parameter, N·m/s.
+    offset : bool
+        Whether a constant torque is fitted.
+    damping : float
+        Bound of a fitted torque in step with the velocity, N·m·s/rad; 0: none is fitted.
+    noise : Noise or None
+        Of the torque.
+    """
+
+    curve: Model
+    equal: bool
+    c: float
+    offset: bool
+    damping: float
+    noise: Noise | None
+
+    @property
+    def fitted(self) -> dict[str, Any]:
+        """Options of `fit_loop` other than the noise."""
+        return {"offset": self.offset, "damping": self.damping}
+
+    def frozen(self, template: Model) -> list[str]:
+        """Return what pre-sliding loops do not determine: everything but k, and alpha unless all are equal."""
+        free = {"k"} if self.equal else {"k", "alpha"}
+        return [f.name for f in template.law.fields if f.name not in free]
+
+    def start(self, loop: Loop, rows: Rows, elements: int) -> Model:
+        """Return a GMS law whose elements come from the linear fit."""
+        k, x = maxwell_start(loop, rows, elements)
+        if self.equal:
+            k, alpha = (
+                np.sum(k) * np.linspace(1.5, 0.5, elements) / elements,
+                np.full(elements, 1.0 / elements),
+            )
+        else:
+            fs = sum(static_levels(self.curve)) / 2.0
+            level = np.maximum(k * x, 0.02 * fs)
+            # What the loop does not load to its limit takes up the rest of the static torque.
+            level[int(np.argmax(x))] += max(fs - float(np.sum(level)), 0.0)
+            alpha = level / np.sum(level)
+        return transfer_curve("gms", self.curve, k=k.tolist(), alpha=alpha.tolist(), c=self.c)
 
 
 def identify_presliding(
     loop: Loop,
-    sliding: Mapping[str, float],
+    curve: Model,
     *,
     elements: int = 0,
     shares: str = "free",
-    c: float = 24.0,
+    c: float | None = None,
     noise: Noise | float | None = None,
     offset: bool = False,
     inertia: float = 0.0,
@@ -134,14 +176,14 @@ def identify_presliding(
     ----------
     loop : Loop
         Pre-sliding motion, two cycles or more; the first full one after the transient is fitted, the others test.
-    sliding : mapping of str to float
-        Parameters of the sliding curve (fs, fc, vs, delta_s, sigma2), identified before.
+    curve : Model
+        Any law with the sliding curve, identified before: of any shape, symmetric or for each direction.
     elements : int
         Their number; 0 takes the fewest that predict the other cycles nearly as well as any.
     shares : {"free", "equal"}
         Whether each element has its own share alpha of the curve, or all the same (thesis Tables 1 and 5).
-    c : float
-        Attraction parameter, N·m/s: in pre-sliding it hardly acts.
+    c : float, optional
+        Attraction parameter, N·m/s, which hardly acts in pre-sliding; that of `curve`, or of thesis Table 1.
     noise : Noise or float, optional
         Standard deviation of a sample, N·m; else from the residual, with its correlation. Cycles that differ, a half
         row of lag, counts and the torque's scale widen the intervals beside it.
@@ -172,20 +214,20 @@ def identify_presliding(
         raise InputError("no full cycle of displacement; record at least two cycles of a slow sinusoid")
     rows = found[0]
     rest = np.concatenate(found[1:]) if len(found) > 1 else np.zeros(0, dtype=np.intp)
-    known, errors = as_noise(noise), dict[int, float]()
     # A lag of the torque makes it lead or follow the velocity, which the elements would take for a stiffness without
     # bound: the faster the loop the more.
     cycle = float(straight.time[rows[-1]] - straight.time[rows[0]])
     damping = LAG * float(np.ptp(straight.torque[rows]) / np.ptp(straight.position[rows]))
     damping = damping if 2.0 * math.pi * LAG > TURNED * cycle else 0.0
-    along_with: dict[str, Any] = {"offset": offset, "damping": damping}
-    options: dict[str, Any] = {"equal": shares == "equal", "sliding": sliding, "c": c, **along_with}
+    attraction = float(getattr(curve.parameters, "c", ATTRACTION)) if c is None else c
+    setup = Setup(curve, shares == "equal", attraction, offset, damping, as_noise(noise))
+    errors: dict[int, float] = {}
     if elements == 0:
-        errors = loop_errors(straight, rows, rest if rest.size else rows, **options)
+        errors = loop_errors(straight, rows, rest if rest.size else rows, setup)
         elements = next(n for n in sorted(errors) if errors[n] <= ENOUGH * min(errors.values()) + 1e-4)
-    equal, wanted = shares == "equal", elements
+    wanted = elements
     while True:
-        fitted, along = fitted_elements(straight, rows, elements, equal, sliding, c, known, along_with)
+        fitted, along = fitted_elements(straight, rows, elements, setup)
         unresolved = stiffest_of(fitted.vector.model(fitted.u), straight, rows)
         if not unresolved or elements <= len(unresolved):
             break
@@ -195,35 +237,34 @@ def identify_presliding(
             f"{elements} elements of {wanted}: more would slip within {100.0 * RESOLVED:g} % of the travel, where the "
             "loop shows no stiffness.",
         )
-    curve = curve_of(along, fitted.vector, fitted.u)
+    simulated = curve_of(along, fitted.vector, fitted.u)
     model = fitted.vector.model(fitted.u)
-    estimates = doubted(straight, fitted, found, frozen_of(model, equal), {"noise": known, **along_with})
+    estimates = add_systematic_errors(
+        straight, fitted, found, setup.frozen(model), {"noise": setup.noise, **setup.fitted}
+    )
+    notes = (*notes, *describe_unused(curve, model), *loop_notes(straight, model, rows, rest))
     return Identification(
-        "presliding", model, estimates, fitted.correlation,
-        loop_misfit(straight, curve, rows, rest, fitted), (*notes, *loop_notes(straight, model, rows, rest)), (),
-        (loop_picture(straight, curve, rows, rest, model),),
-        {"elements": elements, "loop_errors": errors, "curve": curve, "rows": rows},
+        "presliding", model, estimates, fitted.correlation, loop_misfit(straight, simulated, rows, rest, fitted),
+        notes, (), (loop_picture(straight, simulated, rows, rest, model),),
+        {"elements": elements, "loop_errors": errors, "curve": simulated, "rows": rows},
     )  # fmt: skip
 
 
-def fitted_elements(
-    loop: Loop, rows: Rows, elements: int, equal: bool, sliding: Mapping[str, float], c: float, noise: Noise | None,
-    along_with: Mapping[str, Any],
-) -> tuple[Fit, Along]:  # fmt: skip
+def fitted_elements(loop: Loop, rows: Rows, elements: int, setup: Setup) -> tuple[Fit, Along]:
     """The law's elements fitted from several starts, then with the residuals' own correlation."""
-    template = start_model(loop, rows, elements, equal, sliding, c)
-    options: dict[str, Any] = {"frozen": frozen_of(template, equal), "noise": noise, **along_with}
+    template = setup.start(loop, rows, elements)
+    options: dict[str, Any] = {"frozen": setup.frozen(template), "noise": setup.noise, **setup.fitted}
     first, _ = fit_loop(loop, template, rows, starts=6, profiles=False, reach=0.7, **options)
-    lags = 0 if noise else correlation_lags(first.optimum.residuals)
+    lags = 0 if setup.noise else correlation_lags(first.optimum.residuals)
     starts = stiffest_first(first.vector, first.u)[None, :]
     return fit_loop(loop, template, rows, starts=starts, lags=lags, **options)
 
 
 def stiffest_of(model: Model, loop: Loop, rows: Rows) -> list[int]:
     """Elements that slip within `RESOLVED` of the travel."""
-    p = model.parameters
+    p, fs = model.parameters, min(static_levels(model))
     reach = 0.5 * float(np.ptp(loop.position[rows]))
-    return [i for i in range(len(p.k)) if p.alpha[i] * p.fs < RESOLVED * reach * p.k[i]]
+    return [i for i in range(len(p.k)) if p.alpha[i] * fs < RESOLVED * reach * p.k[i]]
 
 
 def stiffest_first(vector: Vector, u: Array) -> Array:
@@ -237,28 +278,13 @@ def stiffest_first(vector: Vector, u: Array) -> Array:
     return vector.coordinates(named)
 
 
-def frozen_of(template: Model, equal: bool) -> list[str]:
-    """What pre-sliding loops do not tell: everything but k, and alpha unless all are equal."""
-    free = {"k"} if equal else {"k", "alpha"}
-    return [f.name for f in template.law.fields if f.name not in free]
-
-
-def loop_errors(
-    loop: Loop,
-    rows: Rows,
-    test: Rows,
-    equal: bool,
-    sliding: Mapping[str, float],
-    c: float,
-    offset: bool,
-    damping: float,
-) -> dict[int, float]:
+def loop_errors(loop: Loop, rows: Rows, test: Rows, setup: Setup) -> dict[int, float]:
     """Relative error on the test rows by the number of elements."""
     out: dict[int, float] = {}
     for n in range(1, MOST + 1):
-        template = start_model(loop, rows, n, equal, sliding, c)
-        fitted, along = fit_loop(loop, template, rows, frozen=frozen_of(template, equal), offset=offset, starts=2,
-                                 damping=damping, profiles=False, reach=0.7)  # fmt: skip
+        template = setup.start(loop, rows, n)
+        fitted, along = fit_loop(loop, template, rows, frozen=setup.frozen(template), starts=2, profiles=False,
+                                 reach=0.7, **setup.fitted)  # fmt: skip
         out[n] = relative_error(loop, curve_of(along, fitted.vector, fitted.u), test)
         if n > 2 and out[n] > 0.97 * min(out[m] for m in range(1, n)):
             break  # one element more no longer helps
@@ -267,9 +293,9 @@ def loop_errors(
 
 def loop_notes(loop: Loop, model: Model, rows: Rows, rest: Rows) -> tuple[str, ...]:
     """What the loop does not show."""
-    p = model.parameters
+    p, fs = model.parameters, max(static_levels(model))
     reach = 0.5 * float(np.ptp(loop.position[rows]))
-    idle = [i for i in range(len(p.k)) if p.alpha[i] * p.fs / p.k[i] > reach]
+    idle = [i for i in range(len(p.k)) if p.alpha[i] * fs / p.k[i] > reach]
     notes: list[str] = []
     if idle:
         names = ", ".join(f"alpha[{i}]" for i in idle)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification, silent
 from stickslip.identify.fit.noise import Noise
@@ -86,6 +87,12 @@ def candidates(velocity: Array, torque: Array, known: Mapping[str, float] | None
         name: Model(law, choices, **{n: given.get(n, value) for n, value in values.items()})
         for name, (law, choices, values) in shapes.items()
     }
+
+
+def each_direction(model: Model) -> Model:
+    """Return a model with separate parameters for the negative direction, equal to those of the positive one."""
+    law, values = model.law.having(symmetry="asymmetric"), model.parameters._asdict()
+    return Model(law, {}, **{f.name: values[f.name.removesuffix(NEGATIVE)] for f in law.fields})
 
 
 def comparable(points: SlidingPoints, templates: Mapping[str, Model]) -> dict[str, Model]:

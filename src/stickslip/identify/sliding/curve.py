@@ -16,7 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError, ParameterError
 from stickslip.identify.estimate import Identification
-from stickslip.identify.evidence import bend_limits, bounded_verdicts, torque_limits, within_speeds
+from stickslip.identify.evidence import bend_limits, bounded_verdicts, within_speeds
 from stickslip.identify.fit.multistart import separable_starts
 from stickslip.identify.fit.noise import Noise, as_noise, noise_of_repeats
 from stickslip.identify.fit.parameter_vector import Vector
@@ -35,7 +35,8 @@ BELOW, ABOVE = 0.5, 2.0
 OWN = "spread within each segment"
 """Source of a noise level that comes from the points themselves."""
 BEYOND = 10.0
-"""Of the largest torque of the points, up to which a level of friction may lie where the record's own is not known."""
+"""Times the largest torque of the points: bound of the search for a level of friction. A level at rest is extrapolated
+and may exceed every torque at constant velocity; what the points leave open shows in its interval."""
 
 
 def default_noise(points: SlidingPoints, noise: Noise | float | None) -> Noise | None:
@@ -67,9 +68,8 @@ def fit_sliding(
     vector = steady_vector(points, template, frozen)
     # A table of points is fitted as it stands; of a record's levels the slow ones may be in doubt.
     bends = bend_limits(vector, np.abs(points.velocity)) if points.absolute else {}
-    vector = vector_of(
-        points, template, free=vector.names, limits={**levels_of(points, vector), **bends, **(limits or {})}
-    )
+    levels = level_bounds(points, vector)
+    vector = vector_of(points, template, free=vector.names, limits={**levels, **bends, **(limits or {})})
     if not vector.free:
         raise InputError(f"{template.law.name}: no free parameter acts at constant velocity")
     torques, weight = Torques(vector, points.velocity, points.side), points.weight
@@ -94,19 +94,15 @@ def fit_sliding(
         residuals, vector, noise=noise, size=float(np.max(np.abs(points.torque))), signed_scale=scales,
         starts=first, profiles=profiles, at_all=at_all,
     )  # fmt: skip
-    bounded = bounded_verdicts(found.estimates, levels_of(points, vector), "the largest torque recorded")
-    bounded = bounded_verdicts(bounded, bends, "the range that was searched")
+    bounded = bounded_verdicts(found.estimates, {**levels, **bends}, "the range that was searched")
     judged = within_speeds(bounded, vector, found.u, np.abs(points.velocity), points.unit[0])
     return replace(found, estimates=judged)
 
 
-def levels_of(points: SlidingPoints, vector: Vector) -> dict[str, tuple[float, float]]:
-    """Return the bounds of the levels of friction, N·m.
-
-    They are at most the largest torque recorded, or twice that torque where a constant torque may cancel part of it.
-    """
-    recorded = points.largest if points.offset is not None else 2.0 * points.largest
-    return torque_limits(vector, min(recorded, BEYOND * float(np.max(np.abs(points.torque)))))
+def level_bounds(points: SlidingPoints, vector: Vector) -> dict[str, tuple[float, float]]:
+    """Return the bounds of the search for levels of friction, by name, N·m."""
+    most = BEYOND * float(np.max(np.abs(points.torque)))
+    return {p.name: (0.0, most) for p in vector.free if p.par.unit == "N·m" and p.par.positive}
 
 
 def identify_sliding(

@@ -1,7 +1,7 @@
-"""Stretches of constant velocity in a motion, from the fastest levels of a staircase to its slowest.
+"""Levels of constant velocity in a motion, from the fastest of a staircase to its slowest.
 
 A velocity is the slope of the position over a window. What an encoder's counts, cogging and noise leave of it is
-small against a fast level over 50 ms, and against a slow one over seconds only: every window is tried, and of stretches
+small against a fast level over 50 ms, and against a slow one over seconds only: every window is tried, and of levels
 that overlap the longest is kept.
 """
 
@@ -21,17 +21,17 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 WINDOW, WIDER, WIDEST = 0.05, 3.0, 0.1
 """s, the first window; by how much the next is wider; part of the record that the last one spans at most."""
 END = 0.1
-"""Of a stretch, a window of it at most, that is left out at its end: the axis may brake there already."""
+"""Of a level, a window of it at most, that is left out at its end: the axis may brake there already."""
 LEAST_COUNTS = 20.0
-"""Counts of the encoder over which a stretch must travel: its velocity is then known to a twentieth."""
+"""Counts of the encoder over which a level must travel: its velocity is then known to a twentieth."""
 SWING = 0.3
 """Of the mean velocity, RMS, by which it may swing about it."""
 OVERLAP = 0.1
-"""Part of a stretch that a longer one may cover."""
+"""Part of a level that a longer one may cover."""
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class Level:
     """Rows (first and last) of about constant velocity, and why it is none to average over; empty where it is."""
 
     first: int
@@ -39,8 +39,8 @@ class Stretch:
     why: str = ""
 
 
-def stretches(time: Array, position: Array, tolerance: float, shortest: float) -> list[Stretch]:
-    """Stretches in which the velocity stays within the tolerance of its mean, in time's order.
+def find_levels(time: Array, position: Array, tolerance: float, shortest: float) -> list[Level]:
+    """Find the rows in which the velocity stays within the tolerance of its mean, in time order.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def stretches(time: Array, position: Array, tolerance: float, shortest: float) -
 
     Returns
     -------
-    list of Stretch
+    list of Level
         Those without a complaint overlap each other by a tenth at most.
     """
     found: list[tuple[int, int, float]] = []
@@ -63,7 +63,7 @@ def stretches(time: Array, position: Array, tolerance: float, shortest: float) -
         stride = max(1, int((window - WINDOW) / (20.0 * row)))
         rows = np.arange(0, time.size, stride)
         speed = slope_of(time, position, window)[rows]
-        # The window smears the ends of a stretch over half of it.
+        # The window smears the ends of a level over half of it.
         margin = 0.5 * (window - WINDOW)
         for a, b in level_runs(time[rows], speed, tolerance):
             begin, end = float(time[rows[a]]), float(time[rows[b]])
@@ -73,29 +73,29 @@ def stretches(time: Array, position: Array, tolerance: float, shortest: float) -
             if last > first and time[last] - time[first] >= max(shortest, window):
                 found.append((first, last, window))
         window *= WIDER
-    return chosen(time, position, found)
+    return select_longest(time, position, found)
 
 
-def chosen(time: Array, position: Array, found: list[tuple[int, int, float]]) -> list[Stretch]:
-    """Of stretches that overlap the longest; those that are no level with the reason."""
+def select_longest(time: Array, position: Array, found: list[tuple[int, int, float]]) -> list[Level]:
+    """Return the longest of levels that overlap; those that cannot be averaged have the reason."""
     count = encoder_step(position)
     noise = max(count / math.sqrt(12.0), white_std(position))
     fine = slope_of(time, position, WINDOW)
     free = np.ones(time.size, dtype=np.bool_)
-    kept: list[Stretch] = []
+    kept: list[Level] = []
     for first, last, window in sorted(found, key=lambda f: time[f[0]] - time[f[1]]):
         if np.mean(free[first : last + 1]) < 1.0 - OVERLAP:
             continue
-        why = complaint(time, position, fine, first, last, window, count, noise)
+        why = find_fault(time, position, fine, first, last, window, count, noise)
         free[first : last + 1] = False
-        kept.append(Stretch(first, last, why))
+        kept.append(Level(first, last, why))
     return sorted(kept, key=lambda s: s.first)
 
 
-def complaint(
+def find_fault(
     time: Array, position: Array, fine: Array, first: int, last: int, window: float, count: float, noise: float
 ) -> str:  # fmt: skip
-    """Why the mean torque of a stretch is not that of its velocity; empty where it is."""
+    """Why the mean torque of a level is not that of its velocity; empty where it is."""
     travel = abs(float(position[last] - position[first]))
     if travel < LEAST_COUNTS * count:
         return f"travels {travel / count:.0f} counts of the encoder"

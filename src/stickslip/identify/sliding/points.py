@@ -33,8 +33,6 @@ class SlidingPoints:
         Whether they are known in N·m; no point then has a smaller standard deviation.
     unit : (str, str)
         Of velocity and torque.
-    largest : float
-        The largest torque recorded, N·m; infinite if it is not known.
     offset : float or None
         Constant torque in `torque` (a weight), N·m; None if it is not known and has to be fitted.
     """
@@ -43,7 +41,6 @@ class SlidingPoints:
     torque: Array
     std: Array | None = None
     unit: tuple[str, str] = ("rad/s", "N·m")
-    largest: float = math.inf
     absolute: bool = False
     offset: float | None = 0.0
 
@@ -75,7 +72,7 @@ class SlidingPoints:
         )
         return SlidingPoints(
             np.concatenate([self.velocity, other.velocity]), np.concatenate([self.torque, other.torque]), std,
-            self.unit, max(self.largest, other.largest), self.absolute and other.absolute, self.offset,
+            self.unit, self.absolute and other.absolute, self.offset,
         )  # fmt: skip
 
     def only(self, rows: Any) -> SlidingPoints:

@@ -44,7 +44,7 @@ def identify_angle(
     record : Record
         Channels ``position`` (absolute, rad), the torque's, and ``velocity_reference`` if known.
     segments : sequence of Segment
-        Which stretches to take; those of `constant_velocity_segments` where empty.
+        Which segments to take; those of `constant_velocity_segments` where empty.
     torque : str
         Channel.
     fastest : float

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.sliding.levels import Stretch, level_runs, slope_of, stretches
+from stickslip.identify.sliding.levels import Level, find_levels, level_runs, slope_of
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.record import Record, encoder_step
 from stickslip.rigs.procedures.resting import RESTING, resting
@@ -28,7 +28,7 @@ REVOLUTION = 2.0 * math.pi
 TRANSIENT, SHARE = math.radians(20.0), 0.2
 """rad, and part of its travel, of a segment that are dropped at its start: whichever is less."""
 BINS = 120
-"""Stretches of a segment that count alike."""
+"""Parts of a segment that count alike."""
 PARTS = 8
 """Of a segment, whose spread is the doubt of its mean where there are no revolutions to compare."""
 LINEARITY = 1e-4
@@ -44,7 +44,7 @@ NAMED = 6
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A stretch of constant velocity.
+    """A part of a record at constant velocity.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Dropped:
-    """A stretch of about constant velocity (s, rad/s) that makes no segment, and why."""
+    """A part of a record at about constant velocity (s, rad/s) that makes no segment, and why."""
 
     start: float
     end: float
@@ -125,14 +125,14 @@ def segments_of(
     record: Record, *, torque: str = "motor_torque", tolerance: float = 0.05, transient: float = TRANSIENT,
     revolution: float = REVOLUTION, shortest: float = 0.2,
 ) -> tuple[tuple[Segment, ...], tuple[Dropped, ...]]:  # fmt: skip
-    """The segments of `constant_velocity_segments`, and the stretches of constant velocity that make none."""
+    """The segments of `constant_velocity_segments`, and the parts at constant velocity that make none."""
     if len(record) < 3:
         raise InputError(f"the record has {len(record)} samples; a constant-velocity segment needs many")
     time, position = record.time, record["position"]
     if "velocity_reference" in record.channels:
-        found = [Stretch(a, b) for a, b in level_runs(time, record["velocity_reference"], tolerance)]
+        found = [Level(a, b) for a, b in level_runs(time, record["velocity_reference"], tolerance)]
     else:
-        found = stretches(time, position, tolerance, 0.5 * shortest)
+        found = find_levels(time, position, tolerance, 0.5 * shortest)
     segments: list[Segment] = []
     dropped: list[Dropped] = []
     for run in found:
@@ -178,17 +178,17 @@ def _averaged(
 
 
 def even_mean(x: Array, y: Array) -> float:
-    """Mean of y over time, every stretch of x counting alike: the speed may ripple, and the axis stick and slip.
+    """Mean of y over time, every part of x counting alike: the speed may ripple, and the axis stick and slip.
 
     A mean over x itself would count the slips only, and their torque is that of the speed which they reach.
     """
-    stretches = min(BINS, x.size // 4)
+    parts = min(BINS, x.size // 4)
     travel = float(x[-1] - x[0])
-    if stretches < 2 or travel == 0.0:
+    if parts < 2 or travel == 0.0:
         return float(np.mean(y))
-    place = np.clip(stretches * (x - x[0]) / travel, 0.0, stretches - 1.0).astype(np.int64)
-    count = np.bincount(place, minlength=stretches)
-    sums = np.bincount(place, weights=y, minlength=stretches)
+    place = np.clip(parts * (x - x[0]) / travel, 0.0, parts - 1.0).astype(np.int64)
+    count = np.bincount(place, minlength=parts)
+    sums = np.bincount(place, weights=y, minlength=parts)
     return float(np.mean(sums[count > 0] / count[count > 0]))
 
 
@@ -208,7 +208,7 @@ def sliding_points(
     Returns
     -------
     points : SlidingPoints
-        Weighted by their standard deviations where every segment has one; ``largest`` is the records' largest torque.
+        Weighted by their standard deviations where every segment has one.
     notes : tuple of str
         What was averaged, what was dropped and why, and what was less than a revolution.
 
@@ -224,7 +224,7 @@ def sliding_points(
     for record in several:
         found, left = segments_of(record, torque=torque, **options)
         slid, stood, sticking = _standing(record, found)
-        segments += _doubted(record, torque, slid, options.get("revolution", REVOLUTION))
+        segments += _with_systematic_errors(record, torque, slid, options.get("revolution", REVOLUTION))
         dropped += [d for d in (*left, *stood) if _worth_naming(d, slid)]
         stuck += sticking
     if not segments:
@@ -233,10 +233,9 @@ def sliding_points(
         raise InputError(f"{_none_found(dropped)}{table}")
     std = np.array([s.std for s in segments])
     usable = bool(np.all(np.isfinite(std) & (std > 0.0)))
-    largest = max(float(np.max(np.abs(r[torque]))) for r in several)
     points = SlidingPoints(
         np.array([s.velocity for s in segments]), np.array([s.torque for s in segments]), std if usable else None,
-        largest=largest, absolute=usable,
+        absolute=usable,
     )  # fmt: skip
     return points, tuple(_notes(segments, dropped, stuck, torque, linear=several[0].units["position"] == "m"))
 
@@ -268,8 +267,10 @@ def _standing(
     return slid, stood, stuck
 
 
-def _doubted(record: Record, torque: str, segments: Sequence[Segment], revolution: float) -> list[Segment]:
-    """The segments with what their own spread does not show added to it: counts and scale of the torque, the angle.
+def _with_systematic_errors(
+    record: Record, torque: str, segments: Sequence[Segment], revolution: float
+) -> list[Segment]:
+    """Add to the standard deviations what the spread within a segment does not show: counts, scale and position.
 
     A segment of less than a revolution sees a part of what depends on the angle. How far the mean over such a part lies
     from that over all shows in the slowest segment that has a whole revolution, or in the longest.

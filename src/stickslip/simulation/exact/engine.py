@@ -100,6 +100,17 @@ def modulations(law: Law) -> str:
     return ", ".join(named)
 
 
+def lacks_modes(side: Side) -> str:
+    """Say why a side has no elements or bristle: an option that no element has, or a law without `modes`."""
+    if side.model is None:
+        return "no law gives no `modes`"
+    law = side.model.law
+    odd = [f"{c.name} = {law.option_of(c.name)}" for c in law.choices if not law.option(c).keeps_elements]
+    if odd and law.having(**{c.name: c.default for c in law.choices}).modes is not None:
+        return f"law {law.name!r} has {' and '.join(odd)}, for which its flow has no closed form"
+    return f"law {law.name!r} gives no `modes`"
+
+
 def is_literal(side: Side) -> bool:
     """Whether a side's elements break away by the literal slip rule (`stickslip.laws.slip_rule`)."""
     return side.model is not None and side.model.law.option_of("slip_rule") == "literal"
@@ -109,7 +120,7 @@ def _complaint(side: Side) -> str:
     name = side.model.law.name if side.model else "no law"
     e = side.elements
     if e is None:
-        return f"law {name!r} gives no `modes`"
+        return lacks_modes(side)
     if isinstance(e, Elements):
         rigid = [k for k in e.stiffness if math.isinf(k)]
         if rigid and math.isfinite(e.attraction):

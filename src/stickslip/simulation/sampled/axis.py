@@ -29,6 +29,7 @@ from stickslip.simulation.exact.engine import (
     crosses_once,
     curve_of,
     is_literal,
+    lacks_modes,
     layer_of,
     lowest,
     modulations,
@@ -83,7 +84,7 @@ def not_located(side: Side) -> str:
         return f"law {law.name!r} depends on its surroundings ({modulations(law)})"
     e = side.elements
     if e is None:
-        return f"law {law.name!r} gives no `modes`"
+        return lacks_modes(side)
     if not e.constant_curve and (not side.pointers.sliding or e.velocity_scale <= 0.0):
         return f"law {law.name!r} has no sliding curve with a velocity scale"
     if isinstance(e, Bristle) and e.own_growth and not side.pointers.growth:

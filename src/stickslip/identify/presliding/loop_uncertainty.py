@@ -1,4 +1,4 @@
-"""What the residual of one loop does not say of its parameters: cycles that differ, rows, counts and scale.
+"""Systematic errors of elements fitted to one loop: cycles that differ, time stamps, encoder counts, torque scale.
 
 A fit to one cycle of many rows with little noise has a covariance of 1e-6 of its values, and its values are wrong by
 a thousand times that: the torque acted half a row earlier, a count stands for all positions within it, the next cycle
@@ -35,10 +35,10 @@ ENDS = 1e-9
 """Relative decrease of the sum of squares at which a fit ends that starts at the minimum."""
 
 
-def doubted(
+def add_systematic_errors(
     loop: Loop, found: Fit, cycles: Sequence[Rows], frozen: Sequence[str], options: Mapping[str, Any]
 ) -> tuple[Estimate, ...]:
-    """The estimates of a fit to the first of some cycles, with intervals that hold its systematic parts as well.
+    """Widen the intervals of a fit to the first of several cycles by its systematic errors.
 
     Parameters
     ----------
@@ -56,25 +56,28 @@ def doubted(
         return found.estimates
     here = np.array([found.values[n] for n in found.vector.names])
     torques = np.array(["N" in p.par.unit for p in found.vector.free])
-    parts = [correlated(found), LINEARITY * np.abs(here) * math.sqrt(quantile(found.noise)) * torques]
-    others = [refitted(loop, found, rows, frozen, options) for rows in cycles[1:]]
+    parts = [
+        correlated_half_widths(found),
+        LINEARITY * np.abs(here) * math.sqrt(quantile(found.noise)) * torques,
+    ]
+    others = [refit(loop, found, rows, frozen, options) for rows in cycles[1:]]
     off = np.array([x - here for x in others if x is not None])
     if off.size:
         spread = np.sqrt(np.mean(np.vstack([off, 0.0 * here]) ** 2, axis=0))
         parts.append(student_quantile(max(len(off), FEWEST)) * spread)
-    moved = [refitted(x, found, cycles[0], frozen, options) for x in shifted(loop)]
+    moved = [refit(x, found, cycles[0], frozen, options) for x in shift_torque(loop)]
     parts.append(np.max([np.abs(x - here) for x in moved if x is not None] or [0.0 * here], axis=0))
-    dithered = [refitted(x, found, cycles[0], frozen, options) for x in within_counts(loop)]
+    dithered = [refit(x, found, cycles[0], frozen, options) for x in dither_counts(loop)]
     parts.append(1.96 * np.max([np.abs(x - here) for x in dithered if x is not None] or [0.0 * here], axis=0))
     extra = np.sqrt(np.sum(np.square(parts), axis=0))
     level = float(np.sqrt(np.mean(loop.torque[cycles[0]] ** 2)))
     return tuple(
-        widened(e, float(extra[i]), p.nonnegative, level)
+        widen_interval(e, float(extra[i]), p.nonnegative, level)
         for i, (e, p) in enumerate(zip(found.estimates, found.vector.free, strict=True))
     )
 
 
-def correlated(found: Fit) -> Array:
+def correlated_half_widths(found: Fit) -> Array:
     """Half-widths of 95 % intervals where residuals go on from row to row, shape (parameters,).
 
     As many residuals count as there are correlation times in the rows. The sum of their correlation to the data's
@@ -87,7 +90,7 @@ def correlated(found: Fit) -> Array:
     return np.sqrt(quantile(found.noise) * fewer * variance)
 
 
-def refitted(
+def refit(
     loop: Loop, found: Fit, rows: Rows, frozen: Sequence[str], options: Mapping[str, Any]
 ) -> Array | None:
     """Values of the same fit to other rows or a changed loop, from where it stood; None where others are free there."""
@@ -102,7 +105,7 @@ def refitted(
     return values if np.all(np.isfinite(values)) else None
 
 
-def shifted(loop: Loop) -> list[Loop]:
+def shift_torque(loop: Loop) -> list[Loop]:
     """The loop with its torque half a row earlier and later: a row does not say when in it the torque acted."""
     half = 0.5 * float(np.median(np.diff(loop.time)))
     return [
@@ -110,7 +113,7 @@ def shifted(loop: Loop) -> list[Loop]:
     ]
 
 
-def within_counts(loop: Loop) -> list[Loop]:
+def dither_counts(loop: Loop) -> list[Loop]:
     """The loop with positions and torques moved within their counts; none where both are exact."""
     x, y = encoder_step(loop.position), encoder_step(loop.torque)
     if x == 0.0 and y == 0.0:
@@ -126,7 +129,7 @@ def within_counts(loop: Loop) -> list[Loop]:
     ]
 
 
-def widened(e: Estimate, extra: float, positive: bool, level: float) -> Estimate:
+def widen_interval(e: Estimate, extra: float, positive: bool, level: float) -> Estimate:
     """The estimate with another half-width added to its interval: in the logarithm for a positive number."""
     if not (math.isfinite(e.lower) and math.isfinite(e.upper) and math.isfinite(extra)) or extra == 0.0:
         return e
