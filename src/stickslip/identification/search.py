@@ -13,9 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.errors import InputError, UnknownName
 from stickslip.identification.alternatives import usual_alternatives
 from stickslip.identification.alternatives.alternative import Alternative
-from stickslip.identification.alternatives.cogging import candidates, find_orders, order_of
+from stickslip.identification.alternatives.cogging import (
+    candidates,
+    find_orders,
+    named_orders,
+    order_of,
+)
 from stickslip.identification.alternatives.load import registry_for
 from stickslip.identification.noise import Noise, noise_of
 from stickslip.identification.posterior import (
@@ -70,6 +76,9 @@ class Asked:
         Of friction's fall.
     period : float or None
         rad (m) after which a torque over the position repeats; a turn where None.
+    levels : mapping or None
+        Levels of the alternatives that are present, by name, if they are known (``{"play": 1, "cogging 4": 1}``); all
+        others are absent, and no order of cogging is searched. Inferred where None.
     """
 
     pendulum: bool = False
@@ -78,6 +87,7 @@ class Asked:
     known: Mapping[str, float] = field(default_factory=dict[str, float])
     exponents: tuple[float, ...] = EXPONENTS
     period: float | None = None
+    levels: Mapping[str, int] | None = None
 
 
 @dataclass
@@ -145,11 +155,12 @@ def settle(rows: SlidingRows, asked: Asked, skew: float, widths: Sequence[int] =
     pace = float(np.sqrt(np.mean(rows.acceleration**2))) or 1e-300
     level = Level(max(start[0], 1e-3 * size / pace), max(start[1], 0.02 * size), 0.0, rows.period)
     falls = falls_of(rows, rows.fastest * np.geomspace(SLOWEST_FALL, FASTEST_FALL, COARSE), asked.exponents)
-    alternatives = [*usual_alternatives(rows), *registry_for(start[:4], (0.0, 0.0))]
+    levels = asked.levels or {}
+    alternatives = [*usual_alternatives(rows), *registry_for(start[:4], (0.0, 0.0)), *named_orders(levels)]
     columns = [a.columns(rows) for a in alternatives]
     rates = [a.columns(rows.rates) if a.lags else None for a in alternatives]
     usual, numbers = len(alternatives), candidates(rows, asked.period)
-    on: On = (0,) * usual
+    on: On = place_levels(alternatives, levels)
     moving: Array | float = 0.0
     near: Array | None = None
     for number in range(ROUNDS):
@@ -157,12 +168,12 @@ def settle(rows: SlidingRows, asked: Asked, skew: float, widths: Sequence[int] =
         level = level._replace(noise=noise.accelerating)
         core = core_of(rows, asked, level, skew, moving, size, pace)
         posterior = Posterior(core, torque, noise.weight, alternatives, columns, falls, level, rows)
-        on, looked, family = climb(posterior, on, near)
+        on, looked, family = climb(posterior, on, near) if asked.levels is None else evaluate(posterior, on)
         top = int(np.argmax(family.log_evidence))
         if number == ROUNDS - 1:
             break
         residual = torque - posterior.predicted(family, top)
-        if number < ORDER_ROUNDS:
+        if number < ORDER_ROUNDS and asked.levels is None:
             beside = posterior.fixed_columns(top, range(usual, len(alternatives)))
             known = {a.name for a in alternatives}
             root = np.sqrt(noise.weight)
@@ -286,6 +297,29 @@ def climb(posterior: Posterior, on: On, near: Array | None) -> tuple[On, dict[On
         on = new
         family = posterior.family(on)
     return on, looked, family
+
+
+def place_levels(alternatives: Sequence[Alternative], levels: Mapping[str, int]) -> On:
+    """Return the level of every alternative in their order, 0 for those that are not named.
+
+    Raises
+    ------
+    InputError
+        If no alternative has such a name, or it has no such level.
+    """
+    known = {a.name: a for a in alternatives}
+    for name, level in levels.items():
+        if name not in known:
+            raise UnknownName("alternative", name, known)
+        if not 0 <= level < len(known[name].levels):
+            raise InputError(f"{name}: level {level}; it has 0 to {len(known[name].levels) - 1}")
+    return tuple(levels.get(a.name, 0) for a in alternatives)
+
+
+def evaluate(posterior: Posterior, on: On) -> tuple[On, dict[On, float], Family]:
+    """Evaluate known levels in place of `climb`."""
+    family = posterior.family(on)
+    return on, {on: log_sum(family.log_evidence)}, family
 
 
 def moved_skew(posterior: Posterior, family: Family, place: int, skew: float, rows: SlidingRows) -> float:
