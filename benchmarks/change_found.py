@@ -1,7 +1,7 @@
 """Does `stickslip compare` call a change only where there is one, and find 10 % of Coulomb friction?
 
 Every axis of `coverage_records.py` is recorded twice as it is, with other noise, and once with its Coulomb torque
-raised; the records are identified by the prediction error and compared.
+raised; the records are identified with their true law given, and compared.
 
     python benchmarks/change_found.py [--records 40] [--first 0] [--jobs 2]
 """
@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 
 from coverage_records import make
 from stickslip.errors import StickslipError
-from stickslip.identify.axis.identify import identify_axis
+from stickslip.identification.axis import identify_axis
 from stickslip.identify.compare.change import compare_models
 from stickslip.identify.experiment import experiment_of
 from stickslip.identify.identified_file import read_identified
@@ -36,9 +36,7 @@ def study(seed: int) -> tuple[bool, bool] | None:
         found: list[Path] = []
         for i, case in enumerate(cases):
             try:
-                result = identify_axis(
-                    [experiment_of(case.record, axis)], axis, [case.model.law], intervals="prediction"
-                )
+                result = identify_axis([experiment_of(case.record, axis)], axis, [case.model.law])
             except StickslipError as error:
                 print(f"seed {seed} ({case.family}): {error}", file=sys.stderr)
                 return None

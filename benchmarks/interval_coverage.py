@@ -1,7 +1,7 @@
 """Coverage: do 95 % intervals contain the truth, and is what is called identified well determined?
 
-Simulated records (`coverage_records.py`) are identified by `axis_prediction` as if nothing but their law were known,
-and counted. Parallel over records.
+Simulated records (`coverage_records.py`) are identified with their true law given and nothing else, and counted.
+Parallel over records.
 
     python benchmarks/interval_coverage.py [--records 200] [--first 0] [--jobs 2] [--short] [--rows FILE]
 
@@ -31,7 +31,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 from coverage_records import make  # noqa: E402
 from stickslip.errors import StickslipError  # noqa: E402
-from stickslip.identify.axis.prediction import axis_prediction  # noqa: E402
+from stickslip.identification.axis import identify_axis  # noqa: E402
 from stickslip.identify.experiment import experiment_of  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402
 
@@ -69,7 +69,7 @@ def study(seed: int) -> list[Row]:
     axis = ServoAxis(drive_side="load")
     begin = time.process_time()
     try:
-        found = axis_prediction([experiment_of(case.record, axis)], axis, case.model.law)
+        found = identify_axis([experiment_of(case.record, axis)], axis, [case.model.law])
     except StickslipError as error:
         print(f"seed {seed} ({case.family}): {error}", file=sys.stderr)
         return []

@@ -1,7 +1,7 @@
 """How often the numbers called identified hold on ordinary logs, cell by cell.
 
     python benchmarks/ordinary_coverage.py                # all 720 cells, one record each: half an hour on two cores
-    python benchmarks/ordinary_coverage.py --every 10 --law lugre
+    python benchmarks/ordinary_coverage.py --every 7 --law lugre
     python benchmarks/ordinary_coverage.py --plain        # gross sliding alone: five minutes
 
 Logs are those of `ordinary_logs.py`, in which nothing of the package takes part. A second table shows plain least
@@ -86,7 +86,10 @@ def study(task: tuple[tuple[int, str, int, str, str, str], str, bool, float]) ->
         if plain:
             found = estimate_sliding([experiment], AXIS)
             level = found.numbers["fc"].value
-            told = {n: (x.value, x.lower, x.upper, 0.0 < x.upper <= 2.0 * x.lower) for n, x in found.numbers.items()}
+            told = {
+                n: (x.value, x.lower, x.upper, 0.0 < x.upper <= 2.0 * x.lower)
+                for n, x in found.numbers.items()
+            }
             told["offset"] = (*told["offset"][:3], found.numbers["offset"].half <= 0.1 * level)
         else:
             result = identify_axis([experiment], AXIS, [law] if law else ("coulomb", "stribeck", "lugre"))

@@ -1,4 +1,4 @@
-"""Whether parts of a real record say the same: halves, quarters and repeats, compared with plain inverse dynamics.
+"""Do parts of a real record give the same numbers? Halves, quarters and repeats, against plain inverse dynamics.
 
     python benchmarks/real_repeats.py [--only NAME] [--plain] [--jobs 2]
 
@@ -6,12 +6,12 @@ The records are those of the folder that STICKSLIP_DATA names (`../shared/data`;
 robot arm in two records, a brushless motor, a pendulum on a quasi-direct drive. Every part is identified by the
 default and by plain inverse dynamics (`--inverse`); of all pairs of parts of one machine it prints
 
-- how often two numbers that are both called identified agree within the root of the summed squared half-widths,
-- how much of what plain regression tells by its own interval, and repeats, is called identified,
+- how often two numbers that are both identified agree within the root of the summed squared half-widths,
+- how many of the pairs that plain regression determines and repeats are identified,
 - in how many sets every part has the same law,
 - the force error over that of plain regression, on the part itself and on the others of its set.
 
---plain takes the regression on certain sliding alone, in seconds.
+The last line compares both rates with their bars. --plain estimates gross sliding alone, in about a second a part.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 from stickslip.errors import StickslipError  # noqa: E402
-from stickslip.identify.axis.agreed import sliding_values  # noqa: E402
-from stickslip.identify.axis.identify import identify_axis  # noqa: E402
+from stickslip.identification.axis import identify_axis  # noqa: E402
+from stickslip.identification.sliding import estimate_sliding  # noqa: E402
 from stickslip.identify.experiment import Experiment  # noqa: E402
 from stickslip.identify.regression.force_error import force_error_on, plain_error_on  # noqa: E402
 from stickslip.identify.regression.inverse import inverse_dynamics  # noqa: E402
-from stickslip.identify.regression.regression import regress_axis  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402
 
 DATA = Path(os.environ.get("STICKSLIP_DATA", "../shared/data"))
 NAMES = {"inertia": "inertia", "fc": "fc", "sigma2": "fv", "offset": "offset"}
-"""Numbers that both tell, and their names in the inverse dynamics."""
+"""Numbers that both estimate, and their names in the inverse dynamics."""
+AGREE, IDENTIFIED = 0.93, 0.60
+"""Bars: pairs that agree, and pairs that plain regression repeats and that are identified."""
 MORE, QUANTILE = 1.05, 1.96
-OFFSET, WIDEST = (
-    0.1,
-    1.0 / 3.0,
-)  # of Fc, and of the value: half-widths up to which a number is called identified
+OFFSET, FACTOR, WIDEST = 0.1, 2.0, 1.0 / 3.0
+"""Widest interval of an identified number: half-width of an offset over Fc; upper over lower of the others, which is
+about a third of the value on either side."""
 KUKA_GEARS = (1798 / 7, 1872 / 7, 757 / 3, 221.0, 5032 / 21, 206793 / 1340)
 TORQUE_CONSTANT = 0.032  # N·m/A; of the brushless motor, between lines
 
@@ -169,14 +169,12 @@ def identified(task: tuple[str, ServoAxis, list[Experiment], int, bool]) -> Part
         plain, part.failure = None, f"plain: {error}"
     try:
         if sliding_alone:
-            regression = regress_axis([experiment], axis)
-            found = sliding_values(regression, None)
-            level = abs(found["fc"][0])
-            for n in NAMES.keys() & found.keys():
-                value, low, high = found[n]
-                size = max(abs(value), level if n == "offset" else 0.0)
-                doubt = regression.doubt or (n == "fc" and regression.level_doubt)
-                part.own[n] = (value, low, high, not doubt and high - low <= 0.5 * size)
+            numbers = estimate_sliding([experiment], axis).numbers
+            level = abs(numbers["fc"].value)
+            for n in NAMES:
+                x = numbers[n]
+                good = x.half <= OFFSET * level if n == "offset" else 0.0 < x.upper <= FACTOR * x.lower
+                part.own[n] = (x.value, x.lower, x.upper, good)
         else:
             result = identify_axis([experiment], axis)
             part.law = result.model.law.name
@@ -204,7 +202,7 @@ def apart(a: Sequence[float], b: Sequence[float]) -> bool:
 
 
 def plainly(name: str, part: Part) -> bool:
-    """Whether plain regression's number would be called identified, by its own interval."""
+    """Whether plain regression's number would be identified by its own interval."""
     value, width = part.plain[name]
     return width <= (OFFSET * abs(part.plain["fc"][0]) if name == "offset" else WIDEST * value)
 
@@ -214,8 +212,8 @@ def half(own: Sequence[float]) -> tuple[float, float]:
     return own[0], 0.5 * (own[2] - own[1])
 
 
-def told(sets: dict[str, list[Part]]) -> None:
-    """Print every part, then the four figures."""
+def print_figures(sets: dict[str, list[Part]]) -> bool:
+    """Print every part, then the four figures; return whether both bars are met."""
     agree: dict[str, list[bool]] = defaultdict(list)
     plain_agree: dict[str, list[bool]] = defaultdict(list)
     kept: dict[str, list[bool]] = defaultdict(list)
@@ -257,12 +255,18 @@ def told(sets: dict[str, list[Part]]) -> None:
                 if repeats:
                     kept[n].append(both)
     print()
-    for title, of in (("agree", agree), ("plain agrees", plain_agree), ("called identified", kept)):
+    for title, of in (("agree", agree), ("plain agrees", plain_agree), ("identified", kept)):
         every = [x for xs in of.values() for x in xs]
         print(f"{title:18s} {100 * np.mean(every):5.1f} % of {len(every)}: " + ", ".join(
             f"{n} {sum(xs)}/{len(xs)}" for n, xs in of.items()))  # fmt: skip
+    rates = [np.mean([x for xs in of.values() for x in xs] or [True]) for of in (agree, kept)]
+    good = bool(rates[0] >= AGREE and rates[1] >= IDENTIFIED)
+    print(
+        f"{'PASS' if good else 'FAIL'}: {rates[0]:.1%} agree (bar {AGREE:.0%}), {rates[1]:.1%} identified "
+        f"(bar {IDENTIFIED:.0%})"
+    )
     values = [x[3] for parts in sets.values() for p in parts for x in p.own.values()]
-    print(f"values called identified: {100 * np.mean(values):.1f} % of {len(values)}")
+    print(f"values identified: {100 * np.mean(values):.1f} % of {len(values)}")
     if stable:
         print(f"law the same in {sum(stable)} of {len(stable)} sets")
     for title, of in ratios.items():
@@ -272,13 +276,14 @@ def told(sets: dict[str, list[Part]]) -> None:
             print(f"force error over {MORE} of plain, {title}: {len(over)} of {len(of)}, "
                   f"{sum(c for _, _, c in over)} of them where plain's friction is below 0; "
                   f"{', '.join(f'{x:.2f} ({n})' for x, n, _ in over[:8])}")  # fmt: skip
+    return good
 
 
-def main() -> None:
-    """Identify every part and print what they say together."""
+def main() -> int:
+    """Identify every part and print the figures; exit code 1 if a bar is missed."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--only", default="", help="only sets whose name holds this")
-    parser.add_argument("--plain", action="store_true", help="the regression on certain sliding alone")
+    parser.add_argument("--only", default="", help="only sets whose name contains this")
+    parser.add_argument("--plain", action="store_true", help="gross sliding alone")
     parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()
     if not DATA.is_dir():
@@ -293,8 +298,8 @@ def main() -> None:
     sets: dict[str, list[Part]] = defaultdict(list)
     for task, part in zip(tasks, parts, strict=True):
         sets[task[0]].append(part)
-    told(dict(sets))
+    return 0 if print_figures(dict(sets)) else 1
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from scipy.io import loadmat
 
-from stickslip.identify.axis.identify import identify_axis
+from stickslip.identification.axis import identify_axis
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis

@@ -25,7 +25,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from stickslip import plugins
-from stickslip.identify.axis.identify import identify_axis
+from stickslip.identification.axis import identify_axis
 from stickslip.identify.axis.output import Extras, OutputError, output_error
 from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import Motor, ServoAxis

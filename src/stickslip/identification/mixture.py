@@ -78,6 +78,7 @@ class Readout:
         of["skew"][blocks["late torque"][0]] = level.skew
         drift = blocks["drift"]
         of["drift"] = 2.0 * level.friction * (unit[drift[3]] + unit[drift[5]])
+        of["elasticity"] = level.inertia * posterior.rows.period**2 / 12.0 * unit[blocks["elasticity"][0]]
         uneven = unit[core.index("uneven")] if asked.by_direction else np.zeros(posterior.count)
         if asked.by_direction:
             for way, sign in (("positive", 1.0), ("negative", -1.0)):

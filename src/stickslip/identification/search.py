@@ -13,9 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.errors import InputError, UnknownName
 from stickslip.identification.alternatives import usual_alternatives
 from stickslip.identification.alternatives.alternative import Alternative
-from stickslip.identification.alternatives.cogging import candidates, find_orders, order_of
+from stickslip.identification.alternatives.cogging import (
+    candidates,
+    find_orders,
+    named_orders,
+    order_of,
+)
 from stickslip.identification.alternatives.load import registry_for
 from stickslip.identification.noise import Noise, noise_of
 from stickslip.identification.posterior import (
@@ -75,6 +81,9 @@ class Asked:
         Of friction's fall.
     period : float or None
         rad (m) after which a torque over the position repeats; a turn where None.
+    levels : mapping or None
+        Levels of the alternatives that are present, by name, if they are known (``{"play": 1, "cogging 4": 1}``); all
+        others are absent, and no order of cogging is searched. Inferred where None.
     """
 
     pendulum: bool = False
@@ -83,6 +92,7 @@ class Asked:
     known: Mapping[str, float] = field(default_factory=dict[str, float])
     exponents: tuple[float, ...] = EXPONENTS
     period: float | None = None
+    levels: Mapping[str, int] | None = None
 
 
 @dataclass
@@ -174,8 +184,11 @@ class Search:
         self.falls, self.near = falls_of(rows, speeds, asked.exponents), None
         self.alternatives, self.columns, self.rates = list[Alternative](), list[Array](), list[Array | None]()
         self.on: On = ()
-        for alternative in (*usual_alternatives(rows), *registry_for(start, gravity)):
+        levels = asked.levels or {}
+        usual = usual_alternatives(rows, asked.by_direction)
+        for alternative in (*usual, *registry_for(start, gravity), *named_orders(levels)):
             self.add(alternative)
+        self.on = place_levels(self.alternatives, levels)
         self.usual, self.numbers = len(self.alternatives), candidates(rows, asked.period).tolist()
         self.moving: Array | float = 0.0
         self.posterior: Posterior
@@ -203,7 +216,8 @@ class Search:
             self.level,
             self.rows,
         )
-        self.on, looked, family = climb(self.posterior, self.on, self.near)
+        climbed = climb(self.posterior, self.on, self.near) if self.asked.levels is None else None
+        self.on, looked, family = climbed or evaluate(self.posterior, self.on)
         self.fit = Fit(
             self.skew, self.level, [*self.alternatives], [*self.columns], core, self.torque, self.falls, self.on,
             looked, family, noise, self.rows,
@@ -216,7 +230,7 @@ class Search:
         top = int(np.argmax(family.log_evidence))
         mean = family.mean[top]
         self.residual = self.torque - self.posterior.predicted(family, top)
-        if number < ORDER_ROUNDS:
+        if number < ORDER_ROUNDS and self.asked.levels is None:
             self.add_orders(top)
         self.moving = self.model_rate(mean)
         self.level = self.level._replace(
@@ -371,6 +385,29 @@ def climb(posterior: Posterior, on: On, near: Places | None) -> tuple[On, dict[O
         on = new
         family = posterior.family(on)
     return on, looked, family
+
+
+def place_levels(alternatives: Sequence[Alternative], levels: Mapping[str, int]) -> On:
+    """Return the level of every alternative in their order, 0 for those that are not named.
+
+    Raises
+    ------
+    InputError
+        If no alternative has such a name, or it has no such level.
+    """
+    known = {a.name: a for a in alternatives}
+    for name, level in levels.items():
+        if name not in known:
+            raise UnknownName("alternative", name, known)
+        if not 0 <= level < len(known[name].levels):
+            raise InputError(f"{name}: level {level}; it has 0 to {len(known[name].levels) - 1}")
+    return tuple(levels.get(a.name, 0) for a in alternatives)
+
+
+def evaluate(posterior: Posterior, on: On) -> tuple[On, dict[On, float], Family]:
+    """Evaluate known levels in place of `climb`."""
+    family = posterior.family(on)
+    return on, {on: log_sum(family.log_evidence)}, family
 
 
 def moved_skew(posterior: Posterior, family: Family, place: int, skew: float, rows: SlidingRows) -> float:

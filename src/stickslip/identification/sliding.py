@@ -71,7 +71,7 @@ class SlidingPosterior:
     names : tuple of str
         ``inertia``, ``fc``, ``sigma2``, ``offset``, ``skew`` (s by which the torque's column lies behind the torque
         that acted), ``fs`` (the curve's end at rest), ``drift`` (growth of friction's level from the first row to the
-        last); of a pendulum ``gravity_sin``, ``gravity_cos``; by direction ``fc_positive`` and so on. Then the torque
+        last), ``elasticity`` (torque per second derivative of the acceleration: -Jl²/k of a load Jl behind a spring k); of a pendulum ``gravity_sin``, ``gravity_cos``; by direction ``fc_positive`` and so on. Then the torque
         of steady motion forward and backward at `speeds`, ``forward[0]``, ..., ``backward[0]``, ...
     members : tuple of Member
     width : float
@@ -148,6 +148,12 @@ class SlidingPosterior:
     def presence(self, name: str) -> float:
         """Probability that an alternative is present."""
         return float(sum(m.weight for m in self.members if name in m.on))
+
+    @property
+    def stiffness_bound(self) -> float:
+        """Least stiffness, N·m/rad (N/m), that a train to a load of half the inertia may have."""
+        least = min(self.numbers["elasticity"].lower, -1e-300)
+        return (0.5 * self.numbers["inertia"].value) ** 2 / -least
 
     @property
     def compliance(self) -> str:

@@ -36,7 +36,12 @@ from stickslip.identify.fit.jackknife import leave_blocks_out
 from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parallel import mapped
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
-from stickslip.identify.fit.sample_rate_limit import of_presliding, unresolved_refused, unseen_refused
+from stickslip.identify.fit.sample_rate_limit import (
+    of_presliding,
+    stiffness_at_rest,
+    unresolved_refused,
+    unseen_refused,
+)
 from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.fit.uncertainty import interval_of, verdict_on
 from stickslip.identify.observer.innovations import (
@@ -68,6 +73,8 @@ UNMODELLED = 3.0
 observer): chosen by coverage on 51 simulated logs (`benchmarks/ordinary_logs.py`, seeds 8200000, every 13th cell)."""
 DELAY_PRIOR = 0.6
 """Rows, as of sliding: where no sliding tells the delay."""
+SERIES = 0.1
+"""Part of the train's least stiffness that a contact's may be: the two in series are then softer by a tenth."""
 SURE = 0.95
 """Probability from which on friction is taken to fall with velocity."""
 ALIKE = 1e-3
@@ -345,7 +352,7 @@ def fit_law(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any]
     estimates: Sequence[Estimate] = [e for e in found if e.name != DELAY]
     estimates = unseen_refused(estimates, law, own, vector.named(u)["inertia"], highest, period)
     estimates = unresolved_refused(estimates, law, own, evidence.experiments, level)
-    if evidence.sliding is not None and evidence.sliding.compliance:
+    if evidence.sliding is not None:
         estimates = compliant_refused(estimates, model, evidence.sliding)
     return LawFit(
         vector, u, covariance, model, tuple(estimates), contradiction, tuple(criterion.corrections(u))
@@ -355,17 +362,22 @@ def fit_law(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any]
 def compliant_refused(
     estimates: Sequence[Estimate], model: Model, sliding: SlidingPosterior
 ) -> list[Estimate]:
-    """The estimates, those of pre-sliding refused where motor and load do not move as one."""
-    cause = sliding.compliance
-    what, p = sliding.alternatives[cause].cause, sliding.presence(cause)
-    why = (
-        f"only reversals determine it, and there {what} yields as well (present with a probability of {100.0 * p:.0f} "
-        "%); record slow reversals with a sensor at the load"
-    )
-    own = (model.law, model.parameters)
+    """The estimates, those of pre-sliding refused where a train may yield as much as the contact does at reversals."""
+    law, p = model.law, model.parameters
+    stiffness, cause = stiffness_at_rest(law, p), sliding.compliance
+    if cause:
+        why = f"and there {sliding.alternatives[cause].cause} yields as well"
+    elif stiffness > SERIES * sliding.stiffness_bound:
+        why = (
+            f"and a train of {sliding.stiffness_bound:.2g} or more, as soft as sliding allows, may yield there beside "
+            f"the contact of {stiffness:.2g}"
+        )
+    else:
+        return list(estimates)
+    why = f"only reversals determine it, {why}; record slow reversals with a sensor at the load"
     return [
-        replace(e, identified=False, verdict=why, cause=cause, share=p)
-        if e.identified and of_presliding(*own, e.name, sliding.speeds) else e for e in estimates
+        replace(e, identified=False, verdict=why, cause=cause)
+        if e.identified and of_presliding(law, p, e.name, sliding.speeds) else e for e in estimates
     ]  # fmt: skip
 
 

@@ -51,7 +51,7 @@ LOST_MOTION = (1e-4, 1e-2)
 MOST_STATIC = 2.0
 """Static over Coulomb torque at most, where the record does not tell it: contacts of machines have 1 to 2."""
 HIDDEN = (0.1, 0.6)
-"""Of the slowest certain sliding: velocities of a fall of which a tenth at most is left there (exp(-1/0.6²) = 6 %)."""
+"""Of the slowest gross sliding: velocities of a fall of which a tenth at most is left there (exp(-1/0.6²) = 6 %)."""
 MOST_VISCOUS = 9.0
 """Times the viscous friction found, where the record does not tell it."""
 GIVEN = 0.1
@@ -244,8 +244,8 @@ def _with_springs(
 
 
 def _falling(model: Model, found: Identified, rng: np.random.Generator) -> Model:
-    """The law with the fall of friction that the record shows, where it has none itself; with one below the slowest
-    certain sliding, which no record excludes, where it shows none."""
+    """Return a Coulomb law with the fall of friction that the record shows, or with one below the slowest gross
+    sliding, which no record excludes; other laws as they are."""
     fall, slowest = missing_fall(found.misfit), found.misfit.get("slowest_sliding", 0.0)
     if model.law.name != "coulomb":
         return model

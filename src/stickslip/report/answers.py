@@ -342,7 +342,7 @@ def either_way(found: Identification) -> list[str]:
 
 
 def within_speeds(posterior: SlidingPosterior, unit: str) -> str:
-    """The speeds of certain sliding: of others the record says nothing."""
+    """Return the range of speeds in gross sliding: the record contains no others."""
     return f", {posterior.slowest:.3g} to {posterior.fastest:.3g} {unit}"
 
 

@@ -44,7 +44,7 @@ class Sliding:
     record : array of int, shape (n,)
         Which record a row belongs to.
     certain : bool
-        Whether these are rows of certain sliding; else all of the inverse dynamics'.
+        Whether these are rows of gross sliding; else all of the inverse dynamics'.
     share : float
         Part of the records that they are.
     whole : tuple of (array, array)

@@ -34,7 +34,8 @@ FILES = (
 )
 
 
-def usual_alternatives(rows: SlidingRows) -> tuple[Alternative, ...]:
-    """All but those that take a model or a search to be written down."""
+def usual_alternatives(rows: SlidingRows, by_direction: bool = False) -> tuple[Alternative, ...]:
+    """All but those that take a model or a search to be written down; fewer where friction is told by direction."""
     between = (drift.BETWEEN_RECORDS,) if len(rows.records) > 1 else ()
-    return tuple(a for file in FILES for a in file.ALTERNATIVES) + between
+    every = (*(a for file in FILES for a in file.ALTERNATIVES), *between)
+    return tuple(a for a in every if not (by_direction and a is direction.VISCOUS))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,10 @@ MOST = 4
 """Orders added at a time, the strongest first."""
 
 
+PREFIX = "cogging "
+"""How the name of an order begins; its wave number follows."""
+
+
 def order_of(cycles: float, unit: str = "rad") -> Alternative:
     """A torque that repeats `cycles` times a 2π rad of position (m of a linear axis)."""
 
@@ -31,9 +35,14 @@ def order_of(cycles: float, unit: str = "rad") -> Alternative:
         return rows.see(of_record)
 
     return Alternative(
-        f"cogging {cycles:.4g}", both, absent=0.0005, present=(0.1,), odds=0.02, lags=True, removable=True,
+        f"{PREFIX}{cycles:.4g}", both, absent=0.0005, present=(0.1,), odds=0.02, lags=True, removable=True,
         wave_number=cycles, cause=f"cogging of order {cycles:.3g}", remedy="record a whole turn, slowly",
     )  # fmt: skip
+
+
+def named_orders(names: Iterable[str]) -> list[Alternative]:
+    """The orders among the names of alternatives ("cogging 4"); others are left out."""
+    return [order_of(float(n.removeprefix(PREFIX))) for n in names if n.startswith(PREFIX)]
 
 
 def candidates(rows: SlidingRows, period: float | None) -> Array:

@@ -8,14 +8,15 @@ from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.alternatives.curve import octaves
 
 REMEDY = "identify friction per direction (--per-direction), or record both directions alike"
+VISCOUS = Alternative(
+    "viscous friction by direction", lambda rows: rows.see(lambda r: np.abs(r.velocity)) / rows.fastest,
+    present=(0.1,), odds=0.2, cause="viscous friction that differs by direction", remedy=REMEDY,
+)  # fmt: skip
 ALTERNATIVES = (
+    VISCOUS,
     Alternative(
         "inertia by direction", lambda rows: rows.see(lambda r: r.acceleration * r.sign), "inertia", present=(0.1,),
         splits="inertia", cause="an inertia that differs by direction", remedy=REMEDY,
-    ),
-    Alternative(
-        "viscous friction by direction", lambda rows: rows.see(lambda r: np.abs(r.velocity)) / rows.fastest,
-        present=(0.1,), odds=0.2, cause="viscous friction that differs by direction", remedy=REMEDY,
     ),
     Alternative(
         "curve by direction", lambda rows: rows.see(lambda r: octaves(r.velocity, rows.fastest)),

@@ -6,21 +6,32 @@ current loop is a delay to a few hundredths of a row only.
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.rows import SlidingRows
 
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+def one_row(rows: SlidingRows) -> Array:
+    """What a delay of one row takes of a torque in proportion to the acceleration."""
+    return (-rows.jerk * rows.period)[:, None]
+
+
 ALTERNATIVES = (
     Alternative(
-        "late torque", lambda rows: rows.jerk[:, None], "skew", absent=0.03, present=(3.0,),
+        "late torque", lambda rows: rows.jerk[:, None], "skew", present=(3.0,),
         cause="the delay of the torque column", remedy="log torque and motion by one clock, or state --delay",
     ),
     Alternative(
-        "delay by frequency", lambda rows: delay_by_band(rows), "inertia", absent=0.02, present=(0.5,),
+        "no mere delay", one_row, "inertia", absent=0.03, present=(0.1,),
+        cause="a torque column that is spread over time", remedy="log the torque at the drive's own rate, unfiltered",
+    ),
+    Alternative(
+        "delay by frequency", lambda rows: one_row(rows) * rows.band[:, None], "inertia", absent=0.02, present=(0.5,),
         cause="a delay that differs with frequency", remedy="log the torque unfiltered",
     ),
 )  # fmt: skip
-
-
-def delay_by_band(rows: SlidingRows):
-    """Jerk, with another sign in narrow windows than in wide ones."""
-    return (-rows.jerk * rows.period * rows.band)[:, None]

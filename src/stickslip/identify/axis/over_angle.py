@@ -1,7 +1,7 @@
-"""The torque over the angle from the records of an axis: rows of certain sliding are the places of a map.
+"""The torque over the angle from the records of an axis: rows of gross sliding are the places of a map.
 
-What these rows leave beside inertia and friction's curve is fitted with waves over the angle in the same equations;
-orders are chosen by what sectors left out whole say, as from a standstill map (`stickslip.identify.cogging`). The map
+Waves over the angle are fitted together with inertia and friction's curve; orders are chosen by cross-validation on
+whole sectors, as from a standstill map (`stickslip.identify.cogging`). The map
 is then taken out of the recorded torque, so that the axis is identified without it.
 """
 
@@ -56,7 +56,7 @@ INDEPENDENT = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class SlidingPlaces(Places):
-    """Rows of certain sliding, seen through a Gaussian window; `width` is its standard deviation as an angle, rad.
+    """Rows of gross sliding, seen through a smooth window; `width` is its standard deviation as an angle, rad.
 
     Attributes
     ----------

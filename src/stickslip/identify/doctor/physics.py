@@ -139,7 +139,7 @@ def _braking(smooth: Smooth, *, measured: bool) -> tuple[float, float]:
 
 
 def skew(view: View) -> Iterator[Finding]:
-    """When the torque acted, as certain sliding tells it: a note, and a warning from where no drive does so."""
+    """Compare the torque's delay in gross sliding with that of drives: a note, and a warning if no drive has it."""
     smooth = usable(view)
     if smooth is None or (found := view.sliding) is None:
         return
@@ -271,7 +271,7 @@ def _shows_turn(smooth: Smooth, rows: Any, plain: Fit, full: Fit, turns: float) 
 
 
 def _offset(view: View, smooth: Smooth, plain: Fit) -> Iterator[Finding]:
-    """A constant torque against Coulomb friction, where certain sliding tells that; else against the whole torque."""
+    """Compare a constant torque with Coulomb friction from gross sliding, or else with the whole torque."""
     offset, part, found = plain.values[3], "", view.sliding
     weighs = abs(offset) > WEIGHT * float(np.std(smooth.torque)) and plain.explained > 0.5
     large = weighs and _both_ways(smooth)

@@ -1,4 +1,4 @@
-"""Inertia, offset or gravity and friction jointly, from any motion (`stickslip.identify.axis.identify`)."""
+"""Inertia, offset or gravity and friction jointly, from any motion (`stickslip.identification.axis`)."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Linear least squares on the rows of a record: inverse dynamics, and several bands over certain sliding."""
+"""Plain least squares on the rows of a record: inverse dynamics, and the force error of a model."""

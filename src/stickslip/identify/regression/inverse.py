@@ -84,7 +84,7 @@ class InverseDynamics:
         return float(self.values[self.names.index(name)])
 
     def numbers(self) -> dict[str, float]:
-        """Inertia, slope, level, offset and a pendulum's gravity by the names that certain sliding has for them."""
+        """Inertia, slope, level, offset and a pendulum's gravity by their names in gross sliding."""
         gravity = {n: self[n] for n in ("gravity_sin", "gravity_cos") if self.has(n)}
         own = {"inertia": self["inertia"], "sigma2": self.viscous, "fc": self.coulomb, "offset": self.offset}
         return own | gravity
