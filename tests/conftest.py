@@ -55,7 +55,7 @@ LONGEST = (
     "recommend/test_recommend_beside", "contract/test_control_laws", "contract/test_laws", "cli/test_results",
     "rigs/test_ds402", "identify/test_doctor_change", "sweep/test_sweep", "export/test_composed",
     "report/test_thesis_report", "export/test_modelica", "cli/test_identify", "control/test_control_loops",
-    "study/test_stability_map", "web/test_sent", "identify/test_exponent", "identify/test_prediction_error",
+    "study/test_stability_map", "web/test_sent", "identification/test_sliding",
     "test_compiled_code", "rigs/test_faults",
 )  # fmt: skip
 

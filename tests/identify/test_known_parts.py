@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +11,9 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.identify.axis.identify import identify_axis
+from stickslip.identification.axis import identify_axis
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.experiment import Experiment
-from stickslip.identify.regression.regression import regress_axis
 from stickslip.machines.servo import ServoAxis
 
 AXIS = ServoAxis(drive_side="load")
@@ -48,7 +46,8 @@ def test_beside_a_true_value_the_others_hold_and_are_no_less_sure(record: Experi
         assert e.identified
         assert e.lower <= TRUE[n] <= e.upper
         assert e.upper - e.lower <= 1.1 * (free[n].upper - free[n].lower)
-    assert found.details["regression"].numbers[name].interval == (TRUE[name], TRUE[name])
+    sliding = found.details["sliding"].numbers[name]
+    assert sliding.interval == pytest.approx((TRUE[name], TRUE[name]), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -95,18 +94,3 @@ def test_the_command_takes_a_known_inertia(
     assert "Known, not fitted: inertia = 0.004 kg·m²." in found["notes"]
     assert main([*command, "-1"]) == 2
     assert capsys.readouterr().err == "stickslip: --inertia -1 kg·m² must be greater than 0\n"
-
-
-def test_a_law_that_means_another_level_is_not_told_of_it(
-    record: Experiment, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[Any] = []
-
-    def spy(*a: Any, **k: Any) -> Any:
-        asked.append(k.get("known"))
-        return regress_axis(*a, **k)
-
-    identify_axis([record], AXIS, ["coulomb"], frozen=("fc",), values={"fc": 0.3}, regress=spy)
-    monkeypatch.setattr("stickslip.identify.axis.known.by_usual_names", lambda law: False)
-    identify_axis([record], AXIS, ["coulomb"], frozen=("fc",), values={"fc": 0.3}, regress=spy)
-    assert asked == [{"fc": 0.3}, None]

@@ -369,7 +369,9 @@ def _stickslip(
             crossed, amplitude = error, amplitude * 0.93
             continue
         try:
-            found = identify_lugre_dynamics(Response.of(done.record), j, Model("stribeck_plain", {}, **sliding))
+            found = identify_lugre_dynamics(
+                Response.of(done.record), j, Model("stribeck_plain", {}, **sliding)
+            )
         except InputError as error:
             course.add("stickslip", done, None, str(error).rstrip("."))
             return None, ()

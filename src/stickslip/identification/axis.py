@@ -32,7 +32,14 @@ from stickslip.identification.notes import cause_of, on_alternatives, on_drift, 
 from stickslip.identification.posterior import EXPONENTS
 from stickslip.identification.search import Asked as SlidingAsked
 from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
-from stickslip.identification.slow_motion import Evidence, LawFit, correlation_of, fit_law, moments
+from stickslip.identification.slow_motion import (
+    Evidence,
+    LawFit,
+    correlation_of,
+    fit_law,
+    means_the_same,
+    moments,
+)
 from stickslip.identify.axis.gravity import hanging, within_a_turn
 from stickslip.identify.axis.loop_check import doubted_loops
 from stickslip.identify.axis.output import OutputError, judged
@@ -47,6 +54,7 @@ from stickslip.identify.fit.uncertainty import verdict_on
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
 from stickslip.machines.servo import ServoAxis
+from stickslip.model import Model
 from stickslip.spec import Law
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -61,6 +69,11 @@ FALLS = 0.95
 LOOP_OFF = 0.3
 """Relative error of the simulated loop's drive signal from which on its gains are doubted."""
 NOT_SIMULATED = "The law was not simulated beside the record:"
+USUAL_SPEEDS = np.geomspace(1e-3, 1e2, 40)
+"""rad/s (m/s)."""
+UNEVEN = 0.3
+"""Part of their mean by which levels of either direction may differ before a constant torque is likelier."""
+BY_DIRECTION = "A torque offset cannot be distinguished from friction that differs by direction, and counts as such here."
 BESIDE_AXIS = {"drive_gain", "back_emf", "backlash", "controller_gain", "load_motor", "load_external"}
 """Parts of an axis that sliding does not know: where one is fitted or given, the simulation fits all."""
 
@@ -139,11 +152,14 @@ def identify_axis(
             frozen, given = (*frozen, "offset"), {"offset": 0.0, **given}
     asked = Asked(free, frozen, given, extras, robust)
     refuse_harmonics(experiments, extras.harmonics + extras.friction_harmonics, simulated=True)
-    seen = look_at(experiments, axis, asked, per_direction, skew, estimate)
+    seen = look_at(experiments, axis, asked, tried, per_direction, skew, estimate)
     asked = with_exponent(asked, tried, seen.sliding)
     if seen.start is None:
         require_start(seen.experiments, axis, tried, asked)
     notes, candidates = list(seen.notes), list[Candidate]()
+    if per_direction and "offset" in frozen:
+        notes.insert(0, BY_DIRECTION)
+        refuse_weight(seen.sliding, axis)
     simulated = intervals == "prediction" and seen.start is not None
     if len(tried) > 1:
         fitted, held = hold_out(seen.experiments, validation)
@@ -199,8 +215,8 @@ class Seen:
 
 
 def look_at(
-    experiments: Sequence[Experiment], axis: ServoAxis, asked: Asked, per_direction: bool, skew: float | None,
-    estimate: EstimateSliding,
+    experiments: Sequence[Experiment], axis: ServoAxis, asked: Asked, laws: Sequence[Law], per_direction: bool,
+    skew: float | None, estimate: EstimateSliding,
 ) -> Seen:  # fmt: skip
     """Estimate sliding and plain least squares."""
     sliding, notes = None, list[str]()
@@ -209,7 +225,7 @@ def look_at(
         asked.extras.load or asked.extras.friction_harmonics or BESIDE_AXIS & {*asked.free, *asked.values}
     ):
         try:
-            sliding = estimate(experiments, axis, sliding_asked(axis, asked, per_direction, skew))
+            sliding = estimate(experiments, axis, sliding_asked(axis, asked, laws, per_direction, skew))
             notes += [
                 *(on_timing(sliding) if skew is None else []),
                 *on_drift(sliding),
@@ -251,10 +267,17 @@ def with_exponent(asked: Asked, laws: Sequence[Law], sliding: SlidingPosterior |
     return replace(asked, values={**asked.values, "delta_s": exponent})
 
 
-def sliding_asked(axis: ServoAxis, asked: Asked, per_direction: bool, skew: float | None) -> SlidingAsked:
-    """What sliding is told: what is held, and the delay."""
-    names = ("inertia",) if per_direction else ("inertia", "offset")
-    known = {n: float(asked.values[n]) for n in names if n in asked.frozen and n in asked.values}
+def sliding_asked(
+    axis: ServoAxis, asked: Asked, laws: Sequence[Law], per_direction: bool, skew: float | None
+) -> SlidingAsked:
+    """What sliding is given: what is held, and the delay.
+
+    Level and slope of friction only where every law means these by their names and both directions share them.
+    """
+    names = {"inertia"} if per_direction else {"inertia", "offset"}
+    if not per_direction and all(means_the_same(Model(law, **law.example), USUAL_SPEEDS) for law in laws):
+        names |= {"fc", "sigma2"}
+    known = {n: float(asked.values[n]) for n in asked.frozen if n in names and n in asked.values}
     period = asked.extras.harmonic_period
     return SlidingAsked(
         axis.gravity == "pendulum", per_direction, skew, known,
@@ -403,6 +426,7 @@ def finished(
     """Everything in one `Identification`, errors and notes included."""
     experiments, problem = fitted.problem.experiments, fitted.problem
     estimates = within_a_turn(estimates, np.concatenate([t.position for t in experiments]))
+    estimates = apart_from_weight(estimates)
     misfit = errors_of(experiments, problem.signals, fitted.misfits(experiments))
     named, start = problem.vector.named(fitted.u), seen.start
     if start is not None and start.has("fc"):
@@ -509,6 +533,43 @@ def refuse_slow(experiments: Sequence[Experiment]) -> None:
                 "say the unit of the time if it is wrong (--map time=COLUMN:ms), log faster, or identify the curve of "
                 "constant speeds with --method sliding"
             )
+
+
+def refuse_weight(sliding: SlidingPosterior | None, axis: ServoAxis) -> None:
+    """Refuse friction per direction where it would drive the axis in one of them: a constant torque acts.
+
+    Raises
+    ------
+    InputError
+    """
+    if sliding is None or "fc_positive" not in sliding.names:
+        return
+    level, constant = abs(sliding.numbers["fc"].value), sliding.numbers["offset"].value
+    if min(sliding.numbers[n].upper for n in ("fc_positive", "fc_negative")) < 0.0:
+        raise InputError(
+            f"a constant torque of {constant:.3g} {axis.unit('N·m')} acts, a weight, a spring or an offset, larger than "
+            f"friction, {level:.3g}: it cannot be distinguished from a difference between friction's directions; leave "
+            "out --per-direction"
+        )
+
+
+def apart_from_weight(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """The estimates, levels of both directions refused where they differ by more than friction usually does."""
+    level = {e.name: e for e in estimates if e.name in ("fc", "fc_negative")}
+    if len(level) < 2 or any(e.name == "offset" for e in estimates):
+        return tuple(estimates)
+    forward, backward = level["fc"].value, level["fc_negative"].value
+    middle, constant = 0.5 * (forward + backward), 0.5 * (forward - backward)
+    if abs(constant) <= UNEVEN * middle:
+        return tuple(estimates)
+    why = (
+        f"friction of {forward:.4g} and {backward:.4g} may as well be {middle:.4g} both ways and a constant torque of "
+        f"{constant:.4g} {level['fc'].unit} (a weight, a spring, an offset); leave out --per-direction"
+    )
+    both = ("fc", "fs", "fc_negative", "fs_negative")
+    return tuple(
+        replace(e, identified=False, verdict=why) if e.name in both and e.identified else e for e in estimates
+    )
 
 
 def refuse_known_torque(frozen: Sequence[str], values: Mapping[str, float], axis: ServoAxis) -> None:

@@ -71,8 +71,9 @@ class SlidingPosterior:
     names : tuple of str
         ``inertia``, ``fc``, ``sigma2``, ``offset``, ``skew`` (s by which the torque's column lies behind the torque
         that acted), ``fs`` (the curve's end at rest), ``drift`` (growth of friction's level from the first row to the
-        last), ``elasticity`` (torque per second derivative of the acceleration: -Jl²/k of a load Jl behind a spring k); of a pendulum ``gravity_sin``, ``gravity_cos``; by direction ``fc_positive`` and so on. Then the torque
-        of steady motion forward and backward at `speeds`, ``forward[0]``, ..., ``backward[0]``, ...
+        last), ``elasticity`` (torque per second derivative of the acceleration: -Jl²/k of a load
+        Jl behind a spring k); of a pendulum ``gravity_sin``, ``gravity_cos``; by direction ``fc_positive`` and so on.
+        Then the torque of steady motion forward and backward at `speeds`, ``forward[0]``, ..., ``backward[0]``, ...
     members : tuple of Member
     width : float
         Standard deviations, in those of the members, on either side of 95 % of one member.

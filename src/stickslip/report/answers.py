@@ -284,7 +284,9 @@ def evidence(found: Identification, sliding: Sliding | None) -> list[str]:
     unit, posterior = unit_in(found, "N·m"), found.details.get("sliding")
     if sliding is not None:
         speeds = (
-            within_speeds(posterior, unit_in(found, "rad/s")) if isinstance(posterior, SlidingPosterior) else ""
+            within_speeds(posterior, unit_in(found, "rad/s"))
+            if isinstance(posterior, SlidingPosterior)
+            else ""
         )
         out.append(
             f"In gross sliding ({100.0 * sliding.share:.0f} % of the record{speeds}) the model's {effort} is "

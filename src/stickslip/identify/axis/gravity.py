@@ -43,5 +43,3 @@ def within_a_turn(estimates: Sequence[Estimate], position: Array) -> tuple[Estim
                 e = replace(e, lower=lower, upper=upper, identified=False, verdict=why)
         out.append(e)
     return tuple(out)
-
-

@@ -162,7 +162,11 @@ def unseen_refused(
 
 
 def unresolved_refused(
-    estimates: Sequence[Estimate], law: Law, parameters: Any, experiments: Sequence[Experiment], friction: float
+    estimates: Sequence[Estimate],
+    law: Law,
+    parameters: Any,
+    experiments: Sequence[Experiment],
+    friction: float,
 ) -> tuple[Estimate, ...]:
     """The estimates, those of pre-sliding refused where the contact passes its pre-sliding travel within few samples.
 

@@ -60,7 +60,9 @@ def coasting_points(records: Sequence[Record], inertia: float) -> tuple[SlidingP
 
 def _points_of(record: Record, inertia: float) -> SlidingPoints:
     axis = ServoAxis(motion="linear" if record.units["position"] == "m" else "rotary")
-    rows = sliding_rows([Experiment("coasting", record.time, record["position"], np.zeros(len(record)))], axis)
+    rows = sliding_rows(
+        [Experiment("coasting", record.time, record["position"], np.zeros(len(record)))], axis
+    )
     narrow = rows.block == 0
     velocity, acceleration, stroke = rows.velocity[narrow], rows.acceleration[narrow], rows.stroke[narrow]
     _, first, number = np.unique(stroke, return_index=True, return_inverse=True)
