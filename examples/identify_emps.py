@@ -5,8 +5,8 @@
 The record belongs to the report of Janot, Gautier and Brunot (2019, hal-02178709) and is not part of this package;
 without it this prints where to get it. The command line does the second half from the file:
 
-    stickslip identify DATA_EMPS.mat --drive-gain 35.15065 --loop kp=38995.8,kd=243.45,limit=10,span=2 --law coulomb \\
-        --intervals covariance
+    stickslip identify DATA_EMPS.mat --map position=qm:m --drive-gain 35.15065 \\
+        --loop kp=38995.8,kd=243.45,limit=10,span=2 --law coulomb --intervals covariance
 """
 
 from __future__ import annotations
