@@ -73,7 +73,7 @@ USUAL_SPEEDS = np.geomspace(1e-3, 1e2, 40)
 """rad/s (m/s)."""
 UNEVEN = 0.3
 """Part of their mean by which levels of either direction may differ before a constant torque is likelier."""
-BY_DIRECTION = "A torque offset cannot be distinguished from friction that differs by direction, and counts as such here."
+BY_DIRECTION = "A torque offset cannot be distinguished from friction that differs by direction: it counts as friction."
 BESIDE_AXIS = {"drive_gain", "back_emf", "backlash", "controller_gain", "load_motor", "load_external"}
 """Parts of an axis that sliding does not know: where one is fitted or given, the simulation fits all."""
 

@@ -80,6 +80,10 @@ class Readout:
         of["drift"] = 2.0 * level.friction * (unit[drift[3]] + unit[drift[5]])
         of["elasticity"] = level.inertia * posterior.rows.period**2 / 12.0 * unit[blocks["elasticity"][0]]
         uneven = unit[core.index("uneven")] if asked.by_direction else np.zeros(posterior.count)
+        usual = np.array([float(np.median(np.abs(posterior.rows.velocity)))])
+        for a, block in zip(posterior.alternatives, posterior.blocks, strict=True):
+            if a.even is not None and not asked.by_direction:
+                of["offset"][block] += level.of(a.unit) * a.even(usual, posterior.rows)[0]
         if asked.by_direction:
             for way, sign in (("positive", 1.0), ("negative", -1.0)):
                 of[f"fc_{way}"] = of["fc"] + sign * of["offset"]

@@ -69,10 +69,11 @@ class SlidingPosterior:
     Attributes
     ----------
     names : tuple of str
-        ``inertia``, ``fc``, ``sigma2``, ``offset``, ``skew`` (s by which the torque's column lies behind the torque
-        that acted), ``fs`` (the curve's end at rest), ``drift`` (growth of friction's level from the first row to the
-        last), ``elasticity`` (torque per second derivative of the acceleration: -Jl²/k of a load
-        Jl behind a spring k); of a pendulum ``gravity_sin``, ``gravity_cos``; by direction ``fc_positive`` and so on.
+        ``inertia``, ``fc``, ``sigma2``, ``offset`` (at the usual speed, where friction differs by direction), ``skew``
+        (s by which the torque's column lies behind the torque that acted), ``fs`` (the curve's end at rest), ``drift``
+        (growth of friction's level from the first row to the last), ``elasticity`` (torque per second derivative of
+        the acceleration: -Jl²/k of a load Jl behind a spring k); of a pendulum ``gravity_sin``, ``gravity_cos``; by
+        direction ``fc_positive`` and so on.
         Then the torque of steady motion forward and backward at `speeds`, ``forward[0]``, ..., ``backward[0]``, ...
     members : tuple of Member
     width : float

@@ -49,6 +49,9 @@ class Alternative:
     curve : callable, optional
         ``curve(speed, rows)``, shape (m, k): what the columns are in steady motion forward at some speeds, where they
         are part of the friction curve.
+    even : callable, optional
+        ``even(speed, rows)``, shape (m, k): what the columns add to steady motion at some speeds, the same in both
+        directions: friction that differs by direction is a constant torque to a law that has one curve.
     removable : bool
         Whether `SlidingRows.see` alone makes the columns: their torque can be taken out of a record.
     shape : callable, optional
@@ -73,6 +76,7 @@ class Alternative:
     splits: str = ""
     lags: bool = False
     curve: Callable[[Array, SlidingRows], Array] | None = None
+    even: Callable[[Array, SlidingRows], Array] | None = None
     removable: bool = False
     shape: Callable[[Any, int], Array] | None = None
     compliant: bool = False

@@ -10,7 +10,8 @@ from stickslip.identification.alternatives.curve import octaves
 REMEDY = "identify friction per direction (--per-direction), or record both directions alike"
 VISCOUS = Alternative(
     "viscous friction by direction", lambda rows: rows.see(lambda r: np.abs(r.velocity)) / rows.fastest,
-    present=(0.1,), odds=0.2, cause="viscous friction that differs by direction", remedy=REMEDY,
+    present=(0.1,), odds=0.2, even=lambda v, rows: (v / rows.fastest)[:, None],
+    cause="viscous friction that differs by direction", remedy=REMEDY,
 )  # fmt: skip
 ALTERNATIVES = (
     VISCOUS,
@@ -20,6 +21,7 @@ ALTERNATIVES = (
     ),
     Alternative(
         "curve by direction", lambda rows: rows.see(lambda r: octaves(r.velocity, rows.fastest)),
-        absent=0.0005, present=(0.01,), odds=0.2, cause="a friction curve that differs by direction", remedy=REMEDY,
+        absent=0.0005, present=(0.01,), odds=0.2, even=lambda v, rows: octaves(v, rows.fastest),
+        cause="a friction curve that differs by direction", remedy=REMEDY,
     ),
 )  # fmt: skip
