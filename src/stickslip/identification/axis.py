@@ -547,8 +547,8 @@ def refuse_weight(sliding: SlidingPosterior | None, axis: ServoAxis) -> None:
     level, constant = abs(sliding.numbers["fc"].value), sliding.numbers["offset"].value
     if min(sliding.numbers[n].upper for n in ("fc_positive", "fc_negative")) < 0.0:
         raise InputError(
-            f"a constant torque of {constant:.3g} {axis.unit('N·m')} acts, a weight, a spring or an offset, larger than "
-            f"friction, {level:.3g}: it cannot be distinguished from a difference between friction's directions; leave "
+            f"a constant torque of {constant:.3g} {axis.unit('N·m')} acts, a weight, a spring or an offset, larger "
+            f"than friction, {level:.3g}: it cannot be distinguished from a difference between friction's directions; leave "
             "out --per-direction"
         )
 
