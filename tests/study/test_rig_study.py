@@ -115,6 +115,20 @@ def test_a_small_study_is_judged_kept_reported_and_run_again(tmp_path, capsys, m
     assert ExperimentView(again).varied() == ["as it is", "seed 1"]
 
 
+@pytest.mark.slow
+@pytest.mark.long  # ten minutes; the documentation's build runs the part without seeds
+def test_the_page_shows_what_a_fresh_run_prints(tmp_path, capsys):
+    """The tables had been typed, and a fresh run gave others."""
+    page = (Path(__file__).parents[2] / "docs" / "howto" / "rig_study.md").read_text(encoding="utf-8")
+    after = page.partition("stickslip study thesis-rig --seeds 20\n```")[2]
+    shown = after.partition("```text\n")[2].partition("```")[0]
+    assert main(["study", "thesis-rig", "--seeds", "20", "--out", str(tmp_path / "rig")]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    rows = [line for line in shown.splitlines() if line.strip() not in ("", "...")]
+    assert len(rows) > 10
+    assert [line for line in rows if line not in printed] == []
+
+
 OWN = """
 title = "Mine"
 [machines.mine]

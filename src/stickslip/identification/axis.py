@@ -41,6 +41,7 @@ from stickslip.identification.slow_motion import (
     moments,
 )
 from stickslip.identify.axis.gravity import hanging, within_a_turn
+from stickslip.identify.axis.load_check import ADVICE, judged_load
 from stickslip.identify.axis.loop_check import doubted_loops
 from stickslip.identify.axis.output import OutputError, judged
 from stickslip.identify.axis.problem import Problem, mechanics_parameters
@@ -73,7 +74,7 @@ USUAL_SPEEDS = np.geomspace(1e-3, 1e2, 40)
 """rad/s (m/s)."""
 UNEVEN = 0.3
 """Part of their mean by which levels of either direction may differ before a constant torque is likelier."""
-BY_DIRECTION = "A torque offset cannot be distinguished from friction that differs by direction: it counts as friction."
+BY_DIRECTION = "A torque offset cannot be distinguished from friction that differs by direction: it counts as friction here."
 BESIDE_AXIS = {"drive_gain", "back_emf", "backlash", "controller_gain", "load_motor", "load_external"}
 """Parts of an axis that sliding does not know: where one is fitted or given, the simulation fits all."""
 
@@ -189,8 +190,8 @@ class Seen:
 
     Attributes
     ----------
-    experiments : sequence of Experiment
-        Without the torque over position and time that sliding found.
+    recorded, experiments : sequence of Experiment
+        As they were recorded, and without the torque over position and time that sliding found.
     aligned : sequence of Experiment
         The same, their torque moved to when it acted.
     axis : ServoAxis
@@ -200,6 +201,7 @@ class Seen:
     notes : tuple of str
     """
 
+    recorded: Sequence[Experiment]
     experiments: Sequence[Experiment]
     aligned: Sequence[Experiment]
     axis: ServoAxis
@@ -219,7 +221,7 @@ def look_at(
     skew: float | None, estimate: EstimateSliding,
 ) -> Seen:  # fmt: skip
     """Estimate sliding and plain least squares."""
-    sliding, notes = None, list[str]()
+    recorded, sliding, notes = experiments, None, list[str]()
     driven = all(t.drive is not None for t in experiments)
     if driven and not (
         asked.extras.load or asked.extras.friction_harmonics or BESIDE_AXIS & {*asked.free, *asked.values}
@@ -254,7 +256,7 @@ def look_at(
         if n in asked.frozen and n in asked.values and not (per_direction and n == "offset")
     ]  # fmt: skip
     known = [f"Known, not fitted: {', '.join(parts)}."] if parts else []
-    return Seen(experiments, moved, axis, start, sliding, (*known, *notes))
+    return Seen(recorded, experiments, moved, axis, start, sliding, (*known, *notes))
 
 
 def with_exponent(asked: Asked, laws: Sequence[Law], sliding: SlidingPosterior | None) -> Asked:
@@ -426,7 +428,7 @@ def finished(
     """Everything in one `Identification`, errors and notes included."""
     experiments, problem = fitted.problem.experiments, fitted.problem
     estimates = within_a_turn(estimates, np.concatenate([t.position for t in experiments]))
-    estimates = apart_from_weight(estimates)
+    estimates = apart_from_weight(judged_load(estimates, seen.start, fitted.mechanics))
     misfit = errors_of(experiments, problem.signals, fitted.misfits(experiments))
     named, start = problem.vector.named(fitted.u), seen.start
     if start is not None and start.has("fc"):
@@ -459,7 +461,7 @@ def finished(
     )
     found = Identification(
         "axis", fitted.model, tuple(estimates), correlation, misfit,
-        (*notes, *loop_notes(fitted, misfit), *last, *combined),
+        (*notes, *loop_notes(seen, fitted, misfit), *last, *combined),
         measure_next=advice(estimates, problem.law, seen.sliding),
         details={
             "mechanics": fitted.mechanics, "inverse": start, "sliding": seen.sliding, "output": fitted,
@@ -469,10 +471,10 @@ def finished(
     return found
 
 
-def loop_notes(fitted: FittedAxis, misfit: Mapping[str, float]) -> list[str]:
+def loop_notes(seen: Seen, fitted: FittedAxis, misfit: Mapping[str, float]) -> list[str]:
     """That the loop does not make the drive's signal that was recorded; nothing where it does, or there is none."""
     named = fitted.problem.vector.named(fitted.u)
-    if others := doubted_loops(fitted.problem.experiments, named["controller_gain"]):
+    if others := doubted_loops(seen.recorded, named["controller_gain"]):
         return others
     off = misfit.get("drive_relative", 0.0)
     if off <= LOOP_OFF:
@@ -506,6 +508,8 @@ def advice(estimates: Sequence[Estimate], law: Law, sliding: SlidingPosterior | 
     causes = dict.fromkeys(e.cause for e in estimates if e.cause and not e.identified)
     remedies = [] if sliding is None else [sliding.alternatives[c].remedy for c in causes]
     out += [f"{r[0].upper()}{r[1:]}." for r in remedies]
+    if "load_motor" in missing:
+        out.append(ADVICE)
     if "inertia" in missing:
         out.append("Record stronger accelerations.")
     if "fc" in missing:
@@ -547,8 +551,8 @@ def refuse_weight(sliding: SlidingPosterior | None, axis: ServoAxis) -> None:
     level, constant = abs(sliding.numbers["fc"].value), sliding.numbers["offset"].value
     if min(sliding.numbers[n].upper for n in ("fc_positive", "fc_negative")) < 0.0:
         raise InputError(
-            f"a constant torque of {constant:.3g} {axis.unit('N·m')} acts, a weight, a spring or an offset, larger "
-            f"than friction, {level:.3g}: it cannot be distinguished from a difference between friction's directions; leave "
+            f"a constant torque of {constant:.3g} {axis.unit('N·m')} acts, a weight, a spring or an offset, "
+            f"larger than friction, {level:.3g}: it cannot be distinguished from a difference between friction's directions; leave "
             "out --per-direction"
         )
 

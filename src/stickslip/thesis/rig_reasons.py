@@ -30,17 +30,15 @@ def _listed(evidence: Evidence, name: str, names: Sequence[str]) -> str:
 
 
 def already_oscillates(alone: str, name: str = "shake") -> Reason:
-    """The linear controller alone oscillates on the elastic drivetrain, which keeps the contact sliding."""
+    """The linear controller alone already oscillates, on the elastic drivetrain."""
 
     def reason(evidence: Evidence) -> str:
         at = evidence("strongest", alone)
         if at < SLOW:
             return ""
-        stuck = 100.0 * evidence("sticking", alone)
         return (
             f"{_short(alone)} alone oscillates at {at:.0f} Hz on the elastic drivetrain, with "
-            f"{_value(evidence, name, alone)} RMS. It sticks {stuck:.2g} % of the time; its error is "
-            f"{_value(evidence, 'rms', alone)} RMS."
+            f"{_value(evidence, name, alone)} RMS; its error is {_value(evidence, 'rms', alone)} RMS."
         )
 
     return reason

@@ -16,6 +16,7 @@ import numpy as np
 
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.axis.gravity import hanging
+from stickslip.identify.axis.load_check import tells_external
 from stickslip.identify.axis.problem import Problem, measured, mechanics_parameters
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.axis_start import frozen_by_default, starts
@@ -308,7 +309,9 @@ def laid_out(
         raise InputError(f"inertia = {values['inertia']:g} {axis.unit('kg·m²')} must be greater than 0")
     held = {"drive_gain", "back_emf", "backlash", "controller_gain", *frozen_by_default(law)}
     if axis.gravity != "pendulum":
-        held |= {"gravity", "gravity_angle", "load_external"}
+        held |= {"gravity", "gravity_angle"}
+        if first is None or not tells_external(first):
+            held.add("load_external")
     if not extras.load:
         held |= {"load_motor", "load_external"}
     held = (held - set(asked.free)) | set(asked.frozen)
