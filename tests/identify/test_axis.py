@@ -12,11 +12,9 @@ import pytest
 
 from stickslip import law_names
 from stickslip.errors import InputError, ParameterError, UnknownName
-from stickslip.identify.axis.choice import Candidate, sentence_on
-from stickslip.identify.axis.identify import identify_axis
+from stickslip.identification.axis import identify_axis
 from stickslip.identify.axis.output import Extras, output_error
-from stickslip.identify.axis.result import rising
-from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identify.estimate import Identification
 from stickslip.identify.experiment import Experiment, experiment_of
 from stickslip.identify.fit.axis_start import dimensions, starts
 from stickslip.identify.regression.inverse import correlation_lags, inverse_dynamics
@@ -136,14 +134,6 @@ def test_laws_are_judged_at_speeds_that_they_were_fitted_to() -> None:
     # What an integrating controller holds in the middle of a record is not known: there the end is held out.
     looped = replace(rising, reference=rising.position, loop=Loop(kp=5.0, ki=1.0, kd=0.1))
     assert looped.split(0.3)[0].time[0] == 0.0
-
-
-def test_a_choice_that_foretells_nothing_says_so() -> None:
-    def sentence(misfit: float) -> str:
-        return sentence_on([Candidate("coulomb", 4, {}, np.full(20, misfit**2), {})], "coulomb")
-
-    assert "unsure" in sentence(3.7)
-    assert "unsure" not in sentence(1.2)
 
 
 def test_a_law_of_ones_own_is_identified(tmp_path: Path) -> None:
@@ -345,16 +335,6 @@ def braking_experiment(**mechanics: float) -> Experiment:
     out = drive_axis(Mechanics(1.6e-3, offset=0.1, **mechanics), cases.model("coulomb"), drive)
     position = cases.COUNT * np.round(out[:, 0] / cases.COUNT)
     return Experiment("braking", time, position, out[:, 2], "torque", reference, loop)
-
-
-def test_friction_that_rises_from_rest_is_no_stribeck_effect() -> None:
-    def named(fs: float) -> list[Estimate]:
-        pairs = (("fs", fs), ("fc", 1.0))
-        return [Estimate(n, "N", n, v, 0.01, v - 0.02, v + 0.02, identified=True) for n, v in pairs]
-
-    assert "no Stribeck effect" in rising(named(0.9))[0]
-    assert rising(named(0.97)) == []  # the intervals overlap
-    assert rising(named(1.1)) == []
 
 
 def test_without_its_loop_a_record_still_tells_the_law() -> None:

@@ -12,7 +12,7 @@ import pytest
 import stickslip as ss
 from stickslip.control.linear import Cascade
 from stickslip.errors import InputError
-from stickslip.identify.axis.identify import identify_axis
+from stickslip.identification.axis import identify_axis
 from stickslip.identify.axis.loop_check import doubted_loops, shown_gains
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.methods._experiments import loop_of

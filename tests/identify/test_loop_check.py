@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.identify.axis.identify import identify_axis
+from stickslip.identification.axis import identify_axis
 from stickslip.identify.axis.loop_check import GAINS, doubted_loops, shown_gains
 from stickslip.identify.experiment import Experiment
 from stickslip.machines.servo import ServoAxis

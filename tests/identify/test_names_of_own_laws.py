@@ -9,10 +9,6 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip import plugins
-from stickslip.identify.axis.form import never_falls, of_sliding_form, static_by_name
-from stickslip.laws import LAWS
-from stickslip.model import Model
 from support.sines import sines
 
 CAUCHY = '''"""Friction that falls as 1 / (1 + (v / vs)^2)."""
@@ -85,40 +81,12 @@ def test_a_name_that_means_another_thing_is_a_name(tmp_path: Path, record: dict[
         assert not e.identified or e.lower <= value <= e.upper
 
 
-def test_the_packages_own_names_mean_what_sliding_tells() -> None:
-    for name in LAWS:
-        model = Model(name, **plugins.law(name).example)
-        assert of_sliding_form(model, 0.1, 10.0), name
-        assert static_by_name(model), name
-    slow = Model("stribeck", k=0.5, fs=0.335, fc=0.285, vs=0.01, sigma2=0.018)
-    assert static_by_name(slow)  # a slope so flat that its fall begins before fs is reached
-    law = plugins.law("lugre").having(viscous="power")
-    assert not of_sliding_form(Model(law, **law.example), 0.1, 10.0)
-
-
-def test_the_form_does_not_depend_on_the_numbers_of_the_example(tmp_path: Path) -> None:
-    """A fall far below the slowest sliding is none there, whatever the example's."""
-    law = plugins.law(written(tmp_path, {}))
-    assert of_sliding_form(Model(law, fc=0.5, df=0.2, vs=1e-5, sigma2=0.02), 0.1, 10.0)
-    assert not of_sliding_form(Model(law, fc=0.5, df=0.2, vs=0.3, sigma2=0.02), 0.1, 10.0)
-
-
-def test_a_contact_that_creeps_on_a_steep_slope_is_of_the_same_law() -> None:
-    """A slope fitted so flat that the slowest rows lie on it: level and fall of the rows above are still those."""
-    for slope in (3.5e4, 10.0, 1.0):
-        assert of_sliding_form(Model("stribeck", k=slope, fc=0.5, fs=0.7, vs=0.3, sigma2=0.02), 0.1, 10.0), (
-            slope
-        )
-
-
 def test_an_excess_that_is_called_fs_is_no_static_torque(
     tmp_path: Path, record: dict[str, np.ndarray]
 ) -> None:
     """It was made equal to `fc`, since no static torque lies below the level."""
     text = CAUCHY.replace("p.df", "p.fs").replace("    df:", "    fs:").replace('"df":', '"fs":')
     (tmp_path / "excess.py").write_text(text.replace('"cauchy"', '"excess"'), encoding="utf-8")
-    law = plugins.law(str(tmp_path / "excess.py"))
-    assert not static_by_name(Model(law, fc=0.5, fs=0.2, vs=0.3, sigma2=0.02))
     found = ss.identify(law=str(tmp_path / "excess.py"), torque_is="actual", delay=0.0, **record)
     assert found["fs"].value == pytest.approx(0.2, rel=0.05)
 
@@ -142,16 +110,3 @@ def test_a_law_of_ones_own_that_falls_is_compared(tmp_path: Path, record: dict[s
     assert said.endswith(": coulomb.")
     (compared,) = (note for note in found.notes if "held-out misfit" in note)
     assert {"cauchy", "stribeck_plain"} <= set(re.findall(r"\w+", compared))
-
-
-def test_which_laws_cannot_fall() -> None:
-    assert {n for n in LAWS if never_falls(plugins.law(n))} == {
-        "coulomb", "viscous", "static", "dahl", "maxwell_slip",
-    }  # fmt: skip
-
-
-def test_much_viscous_friction_hides_no_fall(tmp_path: Path) -> None:
-    path = written(tmp_path, {})
-    text = Path(path).read_text(encoding="utf-8").replace('"sigma2": 0.02}', '"sigma2": 3.0}')
-    Path(path).write_text(text, encoding="utf-8")
-    assert not never_falls(plugins.law(path))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
+from stickslip.identification.sliding import estimate_sliding
 from stickslip.identify.axis.over_angle import over_angle
 from stickslip.identify.cogging import identify_cogging
 from stickslip.identify.cogging.moving import in_motion
 from stickslip.identify.experiment import Experiment
-from stickslip.identify.regression.regression import regress_axis
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 from support import places
@@ -112,4 +112,4 @@ def test_motion_without_slow_rows_gives_an_axis_no_map():
         _, table = read(name)
         experiment = Experiment(name, table["t_s"] - table["t_s"][0], table["theta_rad"], table["iq_A"])
         with pytest.raises(InputError, match=why):
-            over_angle([experiment], axis, None, regress_axis)
+            over_angle([experiment], axis, None, estimate_sliding)

@@ -14,8 +14,7 @@ import pytest
 
 from stickslip import Model
 from stickslip.finding import Finding
-from stickslip.identify.axis.identify import identify_axis
-from stickslip.identify.axis.result import on_untold
+from stickslip.identification.axis import identify_axis
 from stickslip.identify.estimate import Estimate, Held, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.needed_motions import EXPERIMENTS, MOTIONS
@@ -337,8 +336,3 @@ def test_one_number_is_spoken_of_as_one_and_several_as_several() -> None:
     assert one_number_each([dataclasses.replace(e, verdict="") for e in (one, two)]) == [
         "fc, sigma2 not identified: the data do not determine them"
     ]
-    assert on_untold([]) == []
-    assert on_untold(["fc"]) == [
-        "Not identified: fc; the model's value of it is one choice of many that fit as well."
-    ]
-    assert "values of these are" in on_untold(["fc", "sigma2"])[0]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from stickslip import Model
-from stickslip.identify.axis.identify import identify_axis
+from stickslip.identification.axis import identify_axis
 from stickslip.identify.estimate import Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.regression.inverse import inverse_dynamics

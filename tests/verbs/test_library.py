@@ -247,7 +247,7 @@ def test_an_unchanged_axis_compares_as_unchanged(result: ss.IdentificationResult
 @pytest.mark.parametrize(
     "first",
     [
-        "import stickslip.identify.axis.identify",
+        "import stickslip.identification.axis",
         "from stickslip.identify import doctor",
         "import stickslip.verbs.identify",
     ],
@@ -256,7 +256,7 @@ def test_the_function_is_there_whatever_was_imported_first(first: str) -> None:
     code = (
         f"{first}\nimport stickslip as ss, inspect\n"
         "assert callable(ss.identify) and 'inertia' in inspect.signature(ss.identify).parameters\n"
-        "import stickslip.identify.axis.identify as axis\nassert axis.identify_axis\n"
+        "import stickslip.identification.axis as axis\nassert axis.identify_axis\n"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert out.returncode == 0, out.stderr
