@@ -119,10 +119,15 @@ def test_a_linear_axis_has_the_same_numbers_in_metres_as_in_millimetres(case: Ca
     assert_alike(found[0], found[1], {"inertia": 1.0 / thousand, "sigma2": 1.0 / thousand})
 
 
-def test_parts_of_one_record_that_overlap_give_the_same_axis(case: Case) -> None:
+def test_the_same_record_twice_gives_the_same_axis(case: Case) -> None:
+    assert_alike(case.found, estimate_sliding([case.experiment, case.experiment], AXIS))
+
+
+def test_a_second_record_that_overlaps_the_first_widens_nothing(case: Case) -> None:
     rows = case.experiment.time.size
     parts = [case.experiment.until(round(0.6 * rows)), case.experiment.since(round(0.4 * rows))]
-    assert_alike(case.found, estimate_sliding(parts, AXIS))
+    changes = compare(estimate_sliding(parts[:1], AXIS), estimate_sliding(parts, AXIS), {})
+    assert {n: c[0] for n, c in changes.items() if c[0] > WIDENED} == {}
 
 
 def test_ten_seconds_of_rest_at_the_end_change_nothing(case: Case) -> None:

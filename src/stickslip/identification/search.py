@@ -69,7 +69,7 @@ class Asked:
     exponents : tuple of float
         Of friction's fall.
     period : float or None
-        rad (m) after which a torque over the position repeats; a turn where None.
+        rad (m) after which a torque over the position repeats; where None a turn, or no period of a linear axis.
     """
 
     pendulum: bool = False
