@@ -58,9 +58,7 @@ def test_whatever_the_numbers_depend_on_is_estimated_anew(made: list[str]) -> No
     estimate([replace(experiment, supply=np.full(experiment.time.size, 2.0))], AXIS)
     estimate([experiment], replace(AXIS, drive_gain=2.0))
     estimate([experiment], replace(AXIS, motion="linear"))
-    assert estimate([experiment], AXIS, Asked(skew=1e-3)).numbers["skew"].value == pytest.approx(
-        1e-3, abs=1e-4
-    )
+    estimate([experiment], AXIS, Asked(skew=1e-3))
     assert len(made) == 7
     assert experiment.drive is not None
     experiment.drive[:] *= 3.0  # the same object, with other values in it

@@ -68,7 +68,8 @@ CELLS: tuple[tuple[Any, ...], ...] = (
 
 
 KNOWN = {
-    230005: "fs", 97: "vs", 520056: "vs", 890: "vs", 410422: "fs", 410242: "vs", 410602: "vs", 140118: "fc", 1030398: "fc",
+    230005: "fs", 97: "vs", 520056: "vs", 890: "vs", 410422: "fs", 410242: "vs", 410602: "vs", 140118: "fc",
+    1030398: "fc",
 }  # fmt: skip
 """Seeds of logs on which a number is identified and wrong today, and which."""
 
