@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -61,18 +60,16 @@ def test_a_torque_once_a_turn_is_a_weight_whatever_the_doctor_says(joint: dict[s
     level = {**joint, "torque": joint["torque"] - WEIGHT * np.sin(joint["position"])}
     made = ss.identify(**level, law="coulomb")
     found, source = made.identification, made.sources[0]
-    regression = found.details["regression"]
+    sliding = found.details["sliding"]
 
     def first(size: float) -> str:
-        bands = [replace(b, harmonics=np.array([[size, 0.0]])) for b in regression.bands]
-        changed = replace(regression, orders=(1.0 / math.tau,), alike=((),), bands=tuple(bands))
-        details = {**found.details, "regression": changed}
+        details = {**found.details, "sliding": replace(sliding, waves=((1.0, size),))}
         quiet = replace(found, details=details, findings=())
         said = replace(made, identification=quiet, sources=(replace(source, findings=()),))
         return said.answers.steps[0].python
 
-    assert "pendulum=True" in first(0.5 * regression.friction)
-    assert "pendulum=True" not in first(0.1 * regression.friction)
+    assert "pendulum=True" in first(0.5 * sliding.friction)
+    assert "pendulum=True" not in first(0.1 * sliding.friction)
 
 
 def test_results_name_arguments_and_no_options(

@@ -74,7 +74,7 @@ USUAL_SPEEDS = np.geomspace(1e-3, 1e2, 40)
 """rad/s (m/s)."""
 UNEVEN = 0.3
 """Part of their mean by which levels of either direction may differ before a constant torque is likelier."""
-BY_DIRECTION = "A torque offset cannot be distinguished from friction that differs by direction: it counts as friction here."
+BY_DIRECTION = "A torque offset cannot be distinguished from friction that differs by direction."
 BESIDE_AXIS = {"drive_gain", "back_emf", "backlash", "controller_gain", "load_motor", "load_external"}
 """Parts of an axis that sliding does not know: where one is fitted or given, the simulation fits all."""
 
@@ -552,7 +552,7 @@ def refuse_weight(sliding: SlidingPosterior | None, axis: ServoAxis) -> None:
     if min(sliding.numbers[n].upper for n in ("fc_positive", "fc_negative")) < 0.0:
         raise InputError(
             f"a constant torque of {constant:.3g} {axis.unit('N·m')} acts, a weight, a spring or an offset, "
-            f"larger than friction, {level:.3g}: it cannot be distinguished from a difference between friction's directions; leave "
+            f"larger than friction, {level:.3g}: it cannot be distinguished from a difference between directions; leave "
             "out --per-direction"
         )
 

@@ -80,10 +80,7 @@ class Asked:
     exponents : tuple of float
         Of friction's fall.
     period : float or None
-        rad (m) after which a torque over the position repeats; a turn where None.
-    levels : mapping or None
-        Levels of the alternatives that are present, by name, if they are known (``{"play": 1, "cogging 4": 1}``); all
-        others are absent, and no order of cogging is searched. Inferred where None.
+        rad (m) after which a torque over the position repeats; where None a turn, or no period of a linear axis.
     """
 
     pendulum: bool = False

@@ -8,7 +8,7 @@ below those of scores summed by stroke or by state (Liang and Zeger 1986).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -251,6 +251,8 @@ def estimate_sliding(
     """
     insist_on_motion(experiments)
     asked = asked or Asked(pendulum=axis.gravity == "pendulum")
+    if axis.motion == "linear" and asked.period is None:
+        asked = replace(asked, period=np.inf)
     rows = sliding_rows(experiments, axis)
     fits = list[Fit]()
     for skew, widths in starts:
