@@ -67,25 +67,7 @@ CELLS: tuple[tuple[Any, ...], ...] = (
 )
 
 
-KNOWN = {
-    230005: "fs", 97: "vs", 520056: "vs", 890: "vs", 410422: "fs", 410242: "vs", 410602: "vs", 140118: "fc",
-    1030398: "fc",
-}  # fmt: skip
-"""Seeds of logs on which a number is identified and wrong today, and which."""
-
-
-def marked(cell: tuple[Any, ...]) -> Any:
-    """Return the cell, expected to fail where a number is known to be wrong."""
-    name = " ".join(map(str, cell))
-    if cell[0] not in KNOWN:
-        return pytest.param(cell, id=name)
-    reason = f"{KNOWN[cell[0]]} is identified and wrong"
-    return pytest.param(
-        cell, id=name, marks=pytest.mark.xfail(strict=True, raises=AssertionError, reason=reason)
-    )
-
-
-@pytest.mark.parametrize("cell", [marked(c) for c in CELLS])
+@pytest.mark.parametrize("cell", CELLS, ids=lambda c: " ".join(map(str, c)))
 def test_no_identified_number_is_wrong(logs: Any, cell: tuple[Any, ...]) -> None:
     log = logs.draw(*cell)
     found = identify_axis([experiment(log)], AXIS, ["lugre"])
@@ -95,10 +77,7 @@ def test_no_identified_number_is_wrong(logs: Any, cell: tuple[Any, ...]) -> None
 
 @pytest.mark.parametrize(("seed", "cell"), [
     (2000264, ("mean", 250, "p-pi", "production", "asymmetry")),
-    pytest.param(
-        2000192, ("actual", 250, "p-pi", "production", "clean"),
-        marks=pytest.mark.xfail(strict=True, reason="fc_negative is identified and wrong"),
-    ),
+    (2000192, ("actual", 250, "p-pi", "production", "clean")),
     (2000160, ("actual", 1000, "feedforward", "staircase", "asymmetry")),
 ])  # fmt: skip
 def test_friction_per_direction_is_right(logs: Any, seed: int, cell: tuple[Any, ...]) -> None:

@@ -125,17 +125,7 @@ EFFECTS: Mapping[str, Any] = {
 
 @pytest.mark.parametrize(
     "effect",
-    [
-        pytest.param(
-            e,
-            marks=pytest.mark.xfail(
-                strict=True, reason="a law that lacks the curve's form is fitted as if exact"
-            ),
-        )
-        if e == "drag"
-        else e
-        for e in EFFECTS
-    ],
+    EFFECTS,
 )
 def test_an_effect_that_the_model_lacks_makes_no_identified_number_wrong(effect: str) -> None:
     found = identify_axis([record(EFFECTS[effect])], AXIS, ["coulomb"])

@@ -273,7 +273,6 @@ def test_friction_that_grows_with_the_load_is_recovered() -> None:
     assert max(away) <= 3.29 / 1.96
 
 
-@pytest.mark.xfail(strict=True, reason="friction with load is identified where it is not determined")
 def test_under_a_constant_torque_load_is_not_told_from_friction_unless_the_drive_brakes() -> None:
     """A torque that always drives is its own load: (1 - l f) T = J a + f sign(v), with l as greater J and f."""
     experiment = cases.experiment("coulomb", offset=0.1, load_motor=0.8)
@@ -311,7 +310,6 @@ def test_the_outer_torques_share_of_the_load_alone_is_judged_too() -> None:
     assert_recovered(swung, {"load_external": 1.5, "fc": cases.FC})
 
 
-@pytest.mark.xfail(strict=True, reason="load_external is not an estimate")
 def test_load_is_told_from_friction_where_the_drive_brakes() -> None:
     experiment = braking_experiment(load_motor=0.8)
     assert np.mean(experiment.signal()[1:] * np.diff(experiment.position) < 0.0) > 0.1
@@ -353,7 +351,6 @@ def test_without_its_loop_a_record_still_tells_the_law() -> None:
     assert_recovered(held, {"fs": 0.335, "fc": cases.FC})
 
 
-@pytest.mark.xfail(strict=True, reason="a wrong gain is not reported")
 def test_gains_that_do_not_make_the_recorded_signal_are_doubted() -> None:
     experiment = cases.experiment("coulomb", seconds=3.0)
     right = identify_axis([experiment], AXIS, ["coulomb"], intervals="covariance")

@@ -135,7 +135,6 @@ def test_an_axis_per_direction_has_a_law_that_differs_and_no_offset(
     assert (p.fc, p.fc_negative) == pytest.approx((by_name["fc"].value, by_name["fc_negative"].value))
 
 
-@pytest.mark.xfail(strict=True, reason="a weight above friction is not refused")
 def test_a_weight_is_no_friction_that_differs_by_direction(logs: Any) -> None:
     """Friction of 0.79 N·m was identified where 0.35 acted beside a weight of 0.45, and -0.1 in the other direction."""
     log = logs.draw(2000160, "actual", 1000, "feedforward", "staircase", "clean")

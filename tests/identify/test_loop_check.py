@@ -147,7 +147,6 @@ def test_nothing_is_said_without_signal_or_rows() -> None:
     assert doubted_loops([idle]) == []
 
 
-@pytest.mark.xfail(strict=True, reason="a wrong gain is not reported")
 def test_identification_doubts_a_loop_that_did_not_make_the_record() -> None:
     axis = ServoAxis(drive_side="load")
     made = recorded(16384, 16384).until(3000)

@@ -552,7 +552,7 @@ def refuse_weight(sliding: SlidingPosterior | None, axis: ServoAxis) -> None:
     if min(sliding.numbers[n].upper for n in ("fc_positive", "fc_negative")) < 0.0:
         raise InputError(
             f"a constant torque of {constant:.3g} {axis.unit('N·m')} acts, a weight, a spring or an offset, "
-            f"larger than friction, {level:.3g}: it cannot be distinguished from a difference between directions; leave "
+            f"larger than friction, {level:.3g}: it cannot be told from a difference between directions; leave "
             "out --per-direction"
         )
 

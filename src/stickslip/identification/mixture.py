@@ -75,7 +75,8 @@ class Readout:
         blocks = {a.name: b for a, b in zip(posterior.alternatives, posterior.blocks, strict=True)}
         unit = np.eye(posterior.count)
         of = {n: unit[k].copy() for k, n in enumerate(core) if n != "uneven"}
-        of["skew"][blocks["late torque"][0]] = level.skew
+        if "late torque" in blocks:
+            of["skew"][blocks["late torque"][0]] = level.skew
         drift = blocks["drift"]
         of["drift"] = 2.0 * level.friction * (unit[drift[3]] + unit[drift[5]])
         of["elasticity"] = level.inertia * posterior.rows.period**2 / 12.0 * unit[blocks["elasticity"][0]]
@@ -140,8 +141,17 @@ class Mixture:
 
 
 def mix(rows: SlidingRows, fits: Sequence[Fit], asked: Asked) -> Mixture:
-    """Every combination within reach of the best of each start, under the same weights."""
+    """Every combination within reach of the best of each start, under the weights of the start that explains most.
+
+    Which that is shows under the mean of all their variances: evidence under different weights cannot be compared.
+    """
     weight = len(fits) / np.sum([1.0 / f.noise.weight for f in fits], axis=0)
+    best = (
+        [float(np.max(f.posterior(weight).family(f.on).log_evidence)) for f in fits]
+        if len(fits) > 1
+        else [0.0]
+    )
+    weight = fits[int(np.argmax(best))].noise.weight
     speeds = np.geomspace(max(rows.slowest, 1e-3 * rows.fastest), rows.fastest, SPEEDS)
     found = list[tuple[Fit, Posterior, Readout, Family, Any]]()
     for f in fits:

@@ -204,7 +204,9 @@ class Posterior:
             - 2.0 * right @ m
         )
         misfit = none + moved - np.einsum("pf,pf->f", z_base, x_base) - np.sum(z_fall * x_fall, axis=1)
-        log_fall = np.log(np.linalg.det(schur))
+        # What rounding leaves of columns that say the same is no evidence.
+        sign, log_fall = np.linalg.slogdet(schur)
+        log_fall = np.where(sign > 0.0, log_fall, np.inf)
         fallen = -0.5 * misfit - 0.5 * (log_det + log_fall) + odds + self.falls.log_odds
         zero = np.zeros((1, 2))
         return Family(

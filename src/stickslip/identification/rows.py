@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -30,10 +31,12 @@ OVERLAP = 3.0
 """Rows per half window."""
 FEWEST = 12
 """Rows of one width that are worth a regression: twice its plain parameters."""
-LATEST = 12
-"""Samples by which the torque's column may lie off."""
+LATEST = 8
+"""Samples by which the torque's column may lie off at most, where its delay is not stated."""
 USUAL = 0.98
 """Quantile that stands for the largest velocity, acceleration and jerk."""
+RARE = 1e-3
+"""Part of the very largest, that it is at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +77,12 @@ class Block:
             kept[order] = csr_matrix((np.tile(weights, self.centres.size), columns, ends), shape=shape)
         return kept[order]
 
-    def torque(self, skew: float) -> Array:
-        """Windowed drive torque, its column `skew` seconds behind the torque that acted, shape (n,)."""
-        padded = np.pad(self.record.drive, LATEST + 1, mode="edge")
-        weights = window_weights(self.half, self.record.period, (0,), skew)
-        return apply_at(padded, self.centres + LATEST + 1, weights)[:, 0]
+    def torque(self, skew: float, order: int = 0) -> Array:
+        """Windowed drive torque or its derivative of that order, its column `skew` s behind the torque that acted."""
+        weights = window_weights(self.half, self.record.period, (order,), skew)
+        edge = math.ceil(abs(skew) / self.record.period) + 1
+        padded = np.pad(self.record.drive, edge, mode="edge")
+        return apply_at(padded, self.centres + edge, weights)[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +208,9 @@ class SlidingRows:
     @cached_property
     def largest(self) -> tuple[float, float, float]:
         """Usual largest speed, acceleration and jerk."""
-        sizes = [float(np.quantile(np.abs(x), USUAL)) for x in (self.velocity, self.acceleration, self.jerk)]
+        every = (self.velocity, self.acceleration, self.jerk)
+        # Where hardly a row accelerates, those that do are the usual ones.
+        sizes = [max(float(np.quantile(np.abs(x), USUAL)), RARE * float(np.max(np.abs(x)))) for x in every]
         return sizes[0] or 1.0, sizes[1] or 1.0, sizes[2] or 1.0
 
 

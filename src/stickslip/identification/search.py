@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,11 +55,32 @@ WORTH = 0.1
 """Log evidence that a change of level must gain."""
 DELAY_PRIOR = 0.6
 """Rows by which a torque column usually lies off (one standard deviation): half a row for a command held, or a mean."""
+ROUNDING = 1e-9
+"""Of the highest speed from row to row: accelerations below it are rounding's."""
 FIRST_FALLS = (0.01, 0.03, 0.1)
 """Parts of the highest speed over which friction falls in the first fit."""
 GRAVITY = ("gravity_sin", "gravity_cos")
-GIVEN = 0.05
-"""Rows to which a stated delay is known."""
+GIVEN = 1e-4
+"""Rows to which a stated delay is known: what it is off by is no mere delay."""
+
+
+class Start(NamedTuple):
+    """Where a search starts.
+
+    Attributes
+    ----------
+    rows : float
+        Of delay.
+    widths : tuple of int
+        Windows that the first fit looks at; all where empty.
+    saturated : bool
+        Whether the first weights are those of what no alternative explains, each as large as it may be: an effect that
+        the plain model's noise would swallow shows beside them.
+    """
+
+    rows: float = 0.0
+    widths: tuple[int, ...] = ()
+    saturated: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,19 +158,16 @@ class Fit:
         )
 
 
-def settle(rows: SlidingRows, asked: Asked, skew: float, widths: Sequence[int] = ()) -> Fit:
+def settle(rows: SlidingRows, asked: Asked, start: Start) -> Fit:
     """Improve weights, orders, levels and delay in turn, from one start.
 
     Parameters
     ----------
     rows : SlidingRows
     asked : Asked
-    skew : float
-        s at which the search starts.
-    widths : sequence of int
-        Widths that the first fit looks at; all where empty.
+    start : Start
     """
-    search = Search(rows, asked, skew if asked.skew is None else asked.skew, widths)
+    search = Search(rows, asked, start)
     for number in range(ROUNDS - 1):
         search.look()
         search.improve(number)
@@ -161,20 +179,23 @@ class Search:
 
     Parameters
     ----------
-    rows, asked, skew, widths
+    rows, asked, start
         As of `settle`.
     """
 
-    def __init__(self, rows: SlidingRows, asked: Asked, skew: float, widths: Sequence[int]) -> None:
+    def __init__(self, rows: SlidingRows, asked: Asked, start: Start) -> None:
+        skew = start.rows * rows.period if asked.skew is None else asked.skew
         self.rows, self.asked, self.begin, self.skew = rows, asked, skew, skew
         self.torque = rows.torque(skew)
         around = gravity_columns(rows) if asked.pendulum else None
-        start, gravity, self.residual = first_fit(rows, self.torque, widths, around)
+        plain, gravity, self.residual = first_fit(rows, self.torque, start.widths, around)
         self.size = float(np.std(self.torque)) or 1e-300
-        self.pace = float(np.sqrt(np.mean(rows.acceleration**2))) or 1e-300
+        # Constant velocities have none but rounding's.
+        least = ROUNDING * rows.fastest / rows.period
+        self.pace = max(float(np.sqrt(np.mean(rows.acceleration**2))), least) or 1e-300
         inertia, friction = (
-            max(float(start[0]), 1e-3 * self.size / self.pace),
-            max(float(start[1]), 0.02 * self.size),
+            max(float(plain[0]), 1e-3 * self.size / self.pace),
+            max(float(plain[1]), 0.02 * self.size),
         )
         self.level = Level(inertia, friction, 0.0, rows.period)
         speeds = rows.fastest * np.geomspace(SLOWEST_FALL, FASTEST_FALL, COARSE)
@@ -183,13 +204,40 @@ class Search:
         self.on: On = ()
         levels = asked.levels or {}
         usual = usual_alternatives(rows, asked.by_direction)
-        for alternative in (*usual, *registry_for(start, gravity), *named_orders(levels)):
+        if asked.skew is not None:
+            usual = tuple(a for a in usual if a.unit != "skew")
+        for alternative in (*usual, *registry_for(plain, gravity), *named_orders(levels)):
             self.add(alternative)
         self.on = place_levels(self.alternatives, levels)
         self.usual, self.numbers = len(self.alternatives), candidates(rows, asked.period).tolist()
         self.moving: Array | float = 0.0
         self.posterior: Posterior
         self.fit: Fit
+        if start.saturated:
+            self.saturate()
+
+    def saturate(self) -> None:
+        """Take off the residual what all alternatives together explain, each as large as it may be."""
+        posterior, _ = self.laid_out()
+        family = posterior.family(tuple(len(a.levels) - 1 for a in self.alternatives))
+        self.residual = self.torque - posterior.predicted(family, int(np.argmax(family.log_evidence)))
+
+    def laid_out(self) -> tuple[Posterior, Noise]:
+        """The posterior and the weights about where it stands."""
+        noise = noise_of(self.rows, self.residual, self.level.inertia, self.level.friction)
+        self.level = self.level._replace(noise=noise.accelerating)
+        core = core_of(self.rows, self.asked, self.level, self.skew, self.moving, self.size, self.pace)
+        posterior = Posterior(
+            core,
+            self.torque,
+            noise.weight,
+            self.alternatives,
+            self.columns,
+            self.falls,
+            self.level,
+            self.rows,
+        )
+        return posterior, noise
 
     def add(self, alternative: Alternative) -> None:
         """Weigh one more alternative, absent at first."""
@@ -200,19 +248,8 @@ class Search:
 
     def look(self) -> Fit:
         """Weights and levels about where it stands."""
-        noise = noise_of(self.rows, self.residual, self.level.inertia, self.level.friction)
-        self.level = self.level._replace(noise=noise.accelerating)
-        core = core_of(self.rows, self.asked, self.level, self.skew, self.moving, self.size, self.pace)
-        self.posterior = Posterior(
-            core,
-            self.torque,
-            noise.weight,
-            self.alternatives,
-            self.columns,
-            self.falls,
-            self.level,
-            self.rows,
-        )
+        self.posterior, noise = self.laid_out()
+        core = self.posterior.core
         climbed = climb(self.posterior, self.on, self.near) if self.asked.levels is None else None
         self.on, looked, family = climbed or evaluate(self.posterior, self.on)
         self.fit = Fit(
@@ -409,10 +446,11 @@ def evaluate(posterior: Posterior, on: On) -> tuple[On, dict[On, float], Family]
 
 def moved_skew(posterior: Posterior, family: Family, place: int, skew: float, rows: SlidingRows) -> float:
     """The skew a Gauss-Newton step further, s; a row at most."""
-    late = next(k for k, a in enumerate(posterior.alternatives) if a.name == "late torque")
     step = float(family.mean[place][posterior.core.names.index("skew")])
-    step += posterior.level.skew * float(family.mean[place][posterior.blocks[late][0]])
-    most = (LATEST - 4) * rows.period
+    for a, block in zip(posterior.alternatives, posterior.blocks, strict=True):
+        if a.unit == "skew":
+            step += posterior.level.skew * float(family.mean[place][block[0]])
+    most = LATEST * rows.period
     return float(np.clip(skew + np.clip(step, -rows.period, rows.period), -most, most))
 
 

@@ -15,18 +15,19 @@ from typing import Any
 import numpy as np
 
 from stickslip.binding import NEGATIVE
+from stickslip.errors import InputError
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.mixture import NEGLIGIBLE, Member, Mixture, mix
-from stickslip.identification.rows import SlidingRows, sample_rows, sliding_rows
-from stickslip.identification.search import Asked, Fit, settle
+from stickslip.identification.rows import LATEST, SlidingRows, sample_rows, sliding_rows
+from stickslip.identification.search import Asked, Fit, Start, settle
 from stickslip.identify.experiment import Experiment, insist_on_motion
 from stickslip.identify.fit.student import student_quantile
 from stickslip.machines.servo import ServoAxis
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-STARTS: tuple[tuple[float, tuple[int, ...]], ...] = ((0.0, ()), (0.0, (2,)), (-1.0, ()))
-"""Rows of skew, and widths of the first fit, from which the search starts."""
+STARTS = (Start(), Start(saturated=True), Start(widths=(2,)))
+"""Where the search starts, in turn, until one ends where another did."""
 UNTHOUGHT = 1.2
 """Factor on every half-width, for what no alternative describes: the one number here that was chosen by coverage (155
 simulated logs of the prototype)."""
@@ -36,6 +37,10 @@ CELL = 0.6
 """Of the step from one velocity of friction's fall that is tried to the next: standard deviation within one."""
 PRESENT = 0.5
 """Probability from which on an alternative counts as there."""
+
+
+class LateTorque(InputError):
+    """The torque's column lies too far off for sliding to find by how much."""
 
 
 @dataclass(frozen=True)
@@ -228,7 +233,7 @@ class SlidingPosterior:
 
 def estimate_sliding(
     experiments: Sequence[Experiment], axis: ServoAxis, asked: Asked | None = None,
-    starts: Sequence[tuple[float, tuple[int, ...]]] = STARTS,
+    starts: Sequence[Start] = STARTS,
 ) -> SlidingPosterior:  # fmt: skip
     """Estimate inertia, friction, constant torque and delay from gross sliding.
 
@@ -240,12 +245,14 @@ def estimate_sliding(
     asked : Asked, optional
         What is known.
     starts : sequence
-        Rows of skew, and widths of the first fit, from which the search starts.
+        Where the search starts, in turn, until one ends where another did.
 
     Raises
     ------
     TooLittleSliding
         If no stroke is long enough.
+    LateTorque
+        If the torque's column lies too many rows off.
     InputError
         If nothing moves.
     """
@@ -255,12 +262,19 @@ def estimate_sliding(
         asked = replace(asked, period=np.inf)
     rows = sliding_rows(experiments, axis)
     fits = list[Fit]()
-    for skew, widths in starts:
-        fit = settle(rows, asked, skew * rows.period, widths)
+    for start in starts:
+        fit = settle(rows, asked, start)
         if any(same_place(fit, f) for f in fits):
             break
         fits.append(fit)
-    return posterior_of(rows, fits, mix(rows, fits, asked))
+    found = posterior_of(rows, fits, mix(rows, fits, asked))
+    if asked.skew is None and abs(found.fits[0].skew) >= (LATEST - 1) * rows.period:
+        side = "after" if found.fits[0].skew < 0.0 else "before"
+        raise LateTorque(
+            f"the torque acted {LATEST - 1} rows or more {side} its row; log torque and motion by one clock, or state "
+            "the delay (--delay)"
+        )
+    return found
 
 
 def same_place(one: Fit, other: Fit) -> bool:

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from stickslip.identification.sliding import PRESENT, SlidingPosterior
-from stickslip.identification.windows import apply_at, window_weights
 from stickslip.machines.two_inertias import TwoInertias
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -47,7 +46,7 @@ def _seen_in(found: SlidingPosterior, width: int) -> tuple[float, float] | None:
     """Frequency of the load, Hz, and the motor's part of the inertia in windows of one width; None for no load."""
     rows, fit = found.rows, found.fits[0]
     mine = np.isin(rows.block, [i for i, b in enumerate(rows.blocks) if b.width == width])
-    bent = np.concatenate([_bent_torque(b, fit.skew) for b in rows.blocks if b.width == width])
+    bent = np.concatenate([b.torque(fit.skew, 2) for b in rows.blocks if b.width == width])
     columns = np.column_stack([
         rows.acceleration[mine], rows.sign[mine], rows.velocity[mine], np.ones(int(mine.sum())), rows.jerk[mine],
         rows.snap[mine], bent,
@@ -63,12 +62,3 @@ def _seen_in(found: SlidingPosterior, width: int) -> tuple[float, float] | None:
     if torque >= 0.0 or inertia <= 0.0:
         return None
     return 1.0 / (2.0 * math.pi * math.sqrt(-torque)), snap / (-torque * inertia)
-
-
-def _bent_torque(block: Any, skew: float) -> Array:
-    """Second derivative of the torque, N·m/s² (N/s²), shape (n,)."""
-    from stickslip.identification.rows import LATEST
-
-    weights = window_weights(block.half, block.record.period, (2,), skew)
-    padded = np.pad(block.record.drive, LATEST + 1, mode="edge")
-    return apply_at(padded, block.centres + LATEST + 1, weights)[:, 0]

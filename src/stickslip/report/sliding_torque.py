@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identification.rows import LATEST, OVERLAP, Block
+from stickslip.identification.rows import OVERLAP, Block
 from stickslip.identification.sliding import SlidingPosterior
 from stickslip.identification.windows import apply_at, window_weights
 from stickslip.identify.estimate import Identification
@@ -128,7 +128,7 @@ def left_by_plain(posterior: SlidingPosterior, places: Any, inverse: Any) -> flo
 def acted(block: Block, skew: float) -> tuple[Array, Array]:
     """Time and torque that acted, of a whole record through the same window."""
     weights = window_weights(block.half, block.record.period, (0,), skew)
-    edge = LATEST + 1 + weights.shape[1] // 2
+    edge = weights.shape[1] // 2
     padded = np.pad(block.record.drive, edge, mode="edge")
     return block.record.time, apply_at(padded, np.arange(block.record.time.size) + edge, weights)[:, 0]
 

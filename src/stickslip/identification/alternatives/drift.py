@@ -22,10 +22,10 @@ def over_time(record: SlidingRecord) -> Array:
 
 
 def by_record(rows: SlidingRows) -> Array:
-    """Constant torque and friction of each record beside those of all, shape (n, 2 records)."""
+    """Constant torque and friction of each record less the mean of all, shape (n, 2 records)."""
     own = list(rows.records)
     of = np.concatenate([np.full(b.centres.size, own.index(b.record)) for b in rows.blocks])
-    each = (of[:, None] == np.arange(len(own))).astype(np.float64)
+    each = (of[:, None] == np.arange(len(own))) - 1.0 / len(own)
     return np.column_stack([each, rows.sign[:, None] * each])
 
 

@@ -148,8 +148,8 @@ def skew(view: View) -> Iterator[Finding]:
     # Only what accelerates the axis tells a time.
     shows = inertia.lower > 0.0
     sure = shows and inertia.upper <= RATIO * inertia.lower
-    untold = not sure or half > MANY * row
-    if untold and (at_reversals := _skew_at_reversals(smooth)) is not None:
+    # Many rows at once look like no delay to sliding, and like nothing else to reversals.
+    if (at_reversals := _skew_at_reversals(smooth)) is not None:
         late, sure = at_reversals, True
         half = ROUGHLY * abs(late) if abs(late) > EARLY else smooth.period
     if not (shows or sure):
@@ -173,7 +173,7 @@ def skew(view: View) -> Iterator[Finding]:
 def _skew_at_reversals(smooth: Smooth) -> float | None:
     """The delay of many rows at which reversals of torque and motion fit, s, where nothing else fits by far; else None.
 
-    Play, wind-up, ringing and a feedforward shift reversals too: it is asked only where sliding does not tell.
+    Play, wind-up, ringing and a feedforward shift reversals too, but none fits them ten times as well as no delay.
     """
     reach = _reach(smooth)
     if _inside(smooth, reach).size < FEWEST:
