@@ -141,13 +141,9 @@ def _braking(smooth: Smooth, *, measured: bool) -> tuple[float, float]:
 def skew(view: View) -> Iterator[Finding]:
     """Compare the torque's delay in gross sliding with that of drives: a note, and a warning if no drive has it."""
     smooth = usable(view)
-    if smooth is None or (found := view.sliding) is None:
+    if smooth is None:
         return
-    number, inertia = found.numbers["skew"], found.numbers["inertia"]
-    late, half, row = number.value, number.half, found.period
-    # Only what accelerates the axis tells a time.
-    shows = inertia.lower > 0.0
-    sure = shows and inertia.upper <= RATIO * inertia.lower
+    late, half, row, shows, sure = _skew_in_sliding(view)
     # Many rows at once look like no delay to sliding, and like nothing else to reversals.
     if (at_reversals := _skew_at_reversals(smooth)) is not None:
         late, sure = at_reversals, True
@@ -168,6 +164,15 @@ def skew(view: View) -> Iterator[Finding]:
         message = f"the torque acted {told} {where} its row on average, {abs(late) / row:.2g} of a row"
         remedy = "identify allows for it" if half <= HELD * row else "log both from one clock"
         yield Finding("note", "torque-timing", message, remedy=remedy)
+
+
+def _skew_in_sliding(view: View) -> tuple[float, float, float, bool, bool]:
+    """Delay, its half-width and the row, s; whether something accelerates, which alone tells it, and surely."""
+    if (found := view.sliding) is None:
+        return 0.0, math.inf, view.period, False, False
+    number, inertia = found.numbers["skew"], found.numbers["inertia"]
+    shows = inertia.lower > 0.0
+    return number.value, number.half, found.period, shows, shows and inertia.upper <= RATIO * inertia.lower
 
 
 def _skew_at_reversals(smooth: Smooth) -> float | None:
