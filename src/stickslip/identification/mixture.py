@@ -141,17 +141,11 @@ class Mixture:
 
 
 def mix(rows: SlidingRows, fits: Sequence[Fit], asked: Asked) -> Mixture:
-    """Every combination within reach of the best of each start, under the weights of the start that explains most.
+    """Every combination within reach of the best of each start, under the mean of all their variances.
 
-    Which that is shows under the mean of all their variances: evidence under different weights cannot be compared.
+    Evidence under different weights could not be compared.
     """
     weight = len(fits) / np.sum([1.0 / f.noise.weight for f in fits], axis=0)
-    best = (
-        [float(np.max(f.posterior(weight).family(f.on).log_evidence)) for f in fits]
-        if len(fits) > 1
-        else [0.0]
-    )
-    weight = fits[int(np.argmax(best))].noise.weight
     speeds = np.geomspace(max(rows.slowest, 1e-3 * rows.fastest), rows.fastest, SPEEDS)
     found = list[tuple[Fit, Posterior, Readout, Family, Any]]()
     for f in fits:

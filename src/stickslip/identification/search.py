@@ -73,14 +73,10 @@ class Start(NamedTuple):
         Of delay.
     widths : tuple of int
         Windows that the first fit looks at; all where empty.
-    saturated : bool
-        Whether the first weights are those of what no alternative explains, each as large as it may be: an effect that
-        the plain model's noise would swallow shows beside them.
     """
 
     rows: float = 0.0
     widths: tuple[int, ...] = ()
-    saturated: bool = False
 
 
 @dataclass(frozen=True)
@@ -213,14 +209,6 @@ class Search:
         self.moving: Array | float = 0.0
         self.posterior: Posterior
         self.fit: Fit
-        if start.saturated:
-            self.saturate()
-
-    def saturate(self) -> None:
-        """Take off the residual what all alternatives together explain, each as large as it may be."""
-        posterior, _ = self.laid_out()
-        family = posterior.family(tuple(len(a.levels) - 1 for a in self.alternatives))
-        self.residual = self.torque - posterior.predicted(family, int(np.argmax(family.log_evidence)))
 
     def laid_out(self) -> tuple[Posterior, Noise]:
         """The posterior and the weights about where it stands."""

@@ -26,7 +26,7 @@ from stickslip.machines.servo import ServoAxis
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-STARTS = (Start(), Start(saturated=True), Start(widths=(2,)))
+STARTS = (Start(), Start(widths=(2,)), Start(rows=-1.0))
 """Where the search starts, in turn, until one ends where another did."""
 UNTHOUGHT = 1.2
 """Factor on every half-width, for what no alternative describes: the one number here that was chosen by coverage (155
