@@ -73,7 +73,9 @@ def test_a_delay_is_told_with_a_coarse_encoder_too():
     assert re.search(r"shifted by (9|10|11) ms \(±1\): torque comes after", found["time-skew"])
 
 
-UNSEEN = pytest.mark.xfail(strict=True, reason="a torque 15 rows early shows neither in sliding nor at reversals here")
+UNSEEN = pytest.mark.xfail(
+    strict=True, reason="a torque 15 rows early shows neither in sliding nor at reversals here"
+)
 
 
 @pytest.mark.parametrize(("base", "rows"), [

@@ -261,7 +261,7 @@ def look_at(
 
 def with_exponent(asked: Asked, laws: Sequence[Law], sliding: SlidingPosterior | None) -> Asked:
     """What is asked, with the likelier exponent of friction's fall where the user names none."""
-    if sliding is None or "delta_s" in (*asked.free, *asked.values) or sliding.falls < FALLS:
+    if sliding is None or "delta_s" in (*asked.free, *asked.values):
         return asked
     if not any(f.name == "delta_s" for law in laws for f in law.fields):
         return asked
