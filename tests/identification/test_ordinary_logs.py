@@ -50,7 +50,7 @@ def test_inertia_and_friction_are_right_whatever_the_torque_column_is(logs: Any)
     assert max(off) <= 1.5
 
 
-CELLS: tuple[tuple[Any, ...], ...] = (
+CELLS: tuple[Any, ...] = (
     (4, "held", 1000, "p-pi", "production", "clean"),
     (4242, "actual", 1000, "p-pi", "production", "clean"),
     (230005, "held", 1000, "p-pi", "sine", "clean"),
@@ -58,6 +58,10 @@ CELLS: tuple[tuple[Any, ...], ...] = (
     (520056, "held", 1000, "feedforward", "steps", "cogging"),
     (890, "commanded", 500, "p-pi", "production", "cogging"),
     (410422, "actual", 500, "p-pi", "production", "backlash"),
+    pytest.param(
+        (410242, "commanded", 500, "p-pi", "production", "backlash"),
+        marks=pytest.mark.xfail(strict=True, reason="vs lies 0.2 % beyond its interval"),
+    ),
     (410602, "mean", 500, "p-pi", "production", "backlash"),
     (140118, "held", 500, "feedforward", "steps", "flexible"),
     (1030398, "actual", 1000, "pid", "steps", "flexible"),
