@@ -31,6 +31,8 @@ OVERLAP = 3.0
 """Rows per half window."""
 FEWEST = 12
 """Rows of one width that are worth a regression: twice its plain parameters."""
+MOST = 10_000
+"""Rows of one width and record: of a long record more tell no more."""
 LATEST = 8
 """Samples by which the torque's column may lie off at most, where its delay is not stated."""
 USUAL = 0.98
@@ -258,7 +260,8 @@ def sliding_rows(experiments: Sequence[Experiment], axis: ServoAxis) -> SlidingR
 def _block(record: SlidingRecord, width: int, half: float) -> Block:
     """Rows of one width whose windows lie inside strokes."""
     m = window_weights(half, record.period, (0,)).shape[1] // 2
-    hop = max(1, int(half / record.period / OVERLAP))
+    sliding = sum(j - i for i, j in record.strokes)
+    hop = max(1, int(half / record.period / OVERLAP), sliding // MOST)
     centres: list[Integers] = [np.arange(i + m + 1, j - m - 1, hop) for i, j in record.strokes]
     kept: Integers = np.concatenate(centres) if centres else np.zeros(0, dtype=np.int64)
     inside = (kept >= m) & (kept < record.time.size - m)
