@@ -130,6 +130,11 @@ class SlidingRows:
         """The same rows, of which columns are seen as their time derivatives."""
         return replace(self, slopes=True)
 
+    @cached_property
+    def kept(self) -> dict[str, Any]:
+        """What was made of the rows and is asked for again."""
+        return {}
+
     def see(self, series: Series) -> Array:
         """Columns of the smooth motion through all windows, shape (n, k)."""
         made = {id(r): series(r) for r in self.records}

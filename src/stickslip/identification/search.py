@@ -229,9 +229,10 @@ class Search:
 
     def add(self, alternative: Alternative) -> None:
         """Weigh one more alternative, absent at first."""
+        columns, rates = columns_of(self.rows, alternative)
         self.alternatives.append(alternative)
-        self.columns.append(alternative.columns(self.rows))
-        self.rates.append(alternative.columns(self.rows.rates) if alternative.lags else None)
+        self.columns.append(columns)
+        self.rates.append(rates)
         self.on = (*self.on, 0)
 
     def look(self) -> Fit:
@@ -289,6 +290,15 @@ class Search:
             if rate is not None:
                 out = out + self.level.friction * rate @ mean[block]
         return np.asarray(out, dtype=np.float64)
+
+
+def columns_of(rows: SlidingRows, alternative: Alternative) -> tuple[Array, Array | None]:
+    """An alternative's columns and, where a delay shifts these, their rates; kept for the next start."""
+    kept: dict[str, tuple[Array, Array | None]] = rows.kept
+    if alternative.name not in kept or alternative.of_model:
+        rates = alternative.columns(rows.rates) if alternative.lags else None
+        kept[alternative.name] = alternative.columns(rows), rates
+    return kept[alternative.name]
 
 
 SHRINK = 0.3

@@ -59,6 +59,8 @@ class Alternative:
     compliant : bool
         Whether motor and load then do not move as one: what reversals alone show of a contact is then the spring's or
         the gap's as well.
+    of_model : bool
+        Whether the columns are made of a first model of the torque, another one from every start.
     wave_number : float
         rad⁻¹ (m⁻¹) of a torque that repeats over the position; 0 of others.
     cause : str
@@ -80,6 +82,7 @@ class Alternative:
     removable: bool = False
     shape: Callable[[Any, int], Array] | None = None
     compliant: bool = False
+    of_model: bool = False
     wave_number: float = 0.0
     cause: str = ""
     remedy: str = ""

@@ -38,11 +38,12 @@ def registry_for(model: Array, gravity: tuple[float, float]) -> tuple[Alternativ
 
     return (
         Alternative(
-            "torque constant", saturated, "torque", present=(0.1,),
+            "torque constant", saturated, "torque", present=(0.1,), of_model=True,
             cause="a torque constant that falls with the current", remedy="record smaller accelerations",
         ),
         Alternative(
             "friction with load", lambda rows: rows.see(lambda r: r.sign * np.abs(inner(r))), "torque", present=(0.2,),
+            of_model=True,
             cause="friction that grows with the load", remedy="record decelerations so hard that the drive brakes",
         ),
     )  # fmt: skip
