@@ -208,6 +208,7 @@ class Posterior:
         sign, log_fall = np.linalg.slogdet(schur)
         log_fall = np.where(sign > 0.0, log_fall, np.inf)
         fallen = -0.5 * misfit - 0.5 * (log_det + log_fall) + odds + self.falls.log_odds
+        fallen = np.where(np.isfinite(fallen), fallen, -np.inf)
         zero = np.zeros((1, 2))
         return Family(
             on, np.append(plain, fallen),

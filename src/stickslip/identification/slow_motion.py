@@ -136,7 +136,10 @@ class LawFit:
         places = [i for p in free if (i := self.vector.coordinate_of(p.name)) is not None]
         if len(places) < 2:
             return []
-        sizes, ways = np.linalg.eigh(self.covariance[np.ix_(places, places)])
+        inner = self.covariance[np.ix_(places, places)]
+        if not np.all(np.isfinite(inner)):
+            return []
+        sizes, ways = np.linalg.eigh(inner)
         names = [
             self.vector.free[i].name for i in range(len(self.vector.free)) if self.vector.free[i] in free
         ]

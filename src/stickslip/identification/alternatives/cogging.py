@@ -9,6 +9,7 @@ import numpy as np
 
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.rows import SlidingRows
+from stickslip.identification.strokes import SlidingRecord
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -24,15 +25,19 @@ PREFIX = "cogging "
 """How the name of an order begins; its wave number follows."""
 
 
-def order_of(cycles: float, unit: str = "rad") -> Alternative:
+def order_of(cycles: float) -> Alternative:
     """A torque that repeats `cycles` times a 2π rad of position (m of a linear axis)."""
 
     def both(rows: SlidingRows) -> Array:
-        def of_record(r: Any) -> Array:
+        def of_record(r: SlidingRecord) -> Array:
             angle = cycles * (r.position + r.origin)
             return np.column_stack([np.sin(angle), np.cos(angle)])
 
-        return rows.see(of_record)
+        # Every round of a search looks for the same waves.
+        key = f"wave {cycles!r}"
+        if key not in rows.kept:
+            rows.kept[key] = rows.see(of_record)
+        return rows.kept[key]
 
     return Alternative(
         f"{PREFIX}{cycles:.4g}", both, absent=0.0005, present=(0.1,), odds=0.02, lags=True, removable=True,
