@@ -143,7 +143,6 @@ def test_its_time_is_that_of_cases_drawn_and_of_their_checks_not_of_the_nominal_
 
     drawn = SimpleNamespace(cases=1000, block=lambda start, stop: np.arange(start, stop)[:, None])
     monkeypatch.setattr(forecast, "compute_cases", ran)
-    monkeypatch.setattr(forecast, "integrator_of", lambda big, run: ("exact", ""))
     monkeypatch.setattr(forecast, "PATIENCE", 1e9)
     monkeypatch.setattr(forecast.time, "process_time", lambda: clock)
     big = SimpleNamespace(runs=[1, 2], drawn=drawn)

@@ -228,6 +228,6 @@ def note_on(candidates: Sequence[Candidate], chosen: str) -> str:
         for c in candidates
     ]
     return (
-        f"Law {chosen!r} is the simplest within one standard error of the best held-out misfit (in standard deviations: "
-        f"{', '.join(parts)})."
+        f"Law {chosen!r} is the simplest within one standard error of the best held-out misfit (in standard "
+        f"deviations: {', '.join(parts)})."
     )
