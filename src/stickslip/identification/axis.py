@@ -168,7 +168,8 @@ def identify_axis(
         candidates = compared(seen, fitted, held, tried, asked, simulated, progress)
         notes.append(note_on(candidates, tried[choose(candidates)].name))
     place = choose(candidates) if candidates else 0
-    chosen, start = tried[place], candidates[place].start if candidates else {}
+    chosen = tried[place]
+    start: Mapping[str, Any] = candidates[place].start if candidates else {}
     own = asked_of(chosen, asked, tried)
     progress(f"{chosen.name}: all of the data")
     why = ""

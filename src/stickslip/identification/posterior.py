@@ -15,6 +15,7 @@ import numpy as np
 
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.rows import SlidingRows
+from stickslip.identification.strokes import SlidingRecord
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 On = tuple[int, ...]
@@ -90,8 +91,8 @@ def falls_of(rows: SlidingRows, speeds: Array, exponents: Sequence[float] = EXPO
     """Lay out falls of friction at some velocities, with every exponent."""
     speed, exponent = np.tile(speeds, len(exponents)), np.repeat(np.array(exponents), speeds.size)
 
-    def left(r: Any) -> Array:
-        ratio = np.abs(r.velocity)[:, None] / speed
+    def left(r: SlidingRecord) -> Array:
+        ratio: Array = np.abs(r.velocity)[:, None] / speed
         return np.exp(-np.where(exponent == 2.0, ratio * ratio, ratio**exponent))
 
     unlike = rows.see(left)
@@ -191,7 +192,8 @@ class Posterior:
             + np.eye(2)
             - np.einsum("pfi,pfj->fij", beside * s, w, optimize=True)
         )
-        spread: Array = np.asarray(np.linalg.inv(schur))
+        invert: Any = np.linalg.inv
+        spread: Array = invert(schur)
         z_base = z[:, None] - beside @ m
         right = self.fall_right.reshape(n, 2)
         z_fall = (right - (mean @ self.cross).reshape(n, 2) - self.fall_gram @ m) * s

@@ -73,7 +73,8 @@ class Block:
 
             weights = window_weights(self.half, self.record.period, (order,))[0]
             m = weights.size // 2
-            columns: Any = np.add.outer(self.centres, np.arange(-m, m + 1)).ravel()
+            offsets: Integers = np.arange(-m, m + 1, dtype=np.int64)
+            columns = (self.centres[:, None] + offsets[None, :]).ravel()
             ends = np.arange(self.centres.size + 1) * weights.size
             shape = (self.centres.size, self.record.time.size)
             kept[order] = csr_matrix((np.tile(weights, self.centres.size), columns, ends), shape=shape)

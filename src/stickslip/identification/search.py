@@ -194,7 +194,7 @@ class Search:
             max(float(plain[1]), 0.02 * self.size),
         )
         self.level = Level(inertia, friction, 0.0, rows.period)
-        speeds = rows.fastest * np.geomspace(SLOWEST_FALL, FASTEST_FALL, COARSE)
+        speeds: Array = rows.fastest * np.geomspace(SLOWEST_FALL, FASTEST_FALL, COARSE, dtype=np.float64)
         self.falls, self.near = falls_of(rows, speeds, asked.exponents), None
         self.alternatives, self.columns, self.rates = list[Alternative](), list[Array](), list[Array | None]()
         self.on: On = ()
@@ -385,9 +385,8 @@ def first_fit(
         scaled = x / unit[:, None]
         norms = np.sqrt(np.sum(scaled**2, axis=0)) + 1e-300
         z = scaled / norms
-        theta = np.asarray(
-            np.linalg.solve(z.T @ z + 1e-9 * np.eye(x.shape[1]), z.T @ (torque / unit)) / norms
-        )
+        solver: Any = np.linalg.solve
+        theta = np.asarray(solver(z.T @ z + 1e-9 * np.eye(x.shape[1]), z.T @ (torque / unit)) / norms)
         left = np.abs(torque - x @ theta)
         unit = np.sqrt(left + 1e-3 * float(np.median(np.abs(torque))) + 1e-300) / use
     gravity = (0.0, 0.0) if around is None else (float(theta[4]), float(theta[5]))

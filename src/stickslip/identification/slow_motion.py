@@ -401,7 +401,8 @@ def spread_of(criterion: Criterion, optimum: Any, evidence: Evidence) -> tuple[A
     known = 0 if criterion.prior is None else criterion.prior.mean.size
     rows = optimum.residuals.size - known
     own = replace(optimum, residuals=optimum.residuals[:rows], jacobian=optimum.jacobian[:rows])
-    apart, pull = optimum.residuals[rows:], optimum.jacobian[rows:]
+    apart: Array = optimum.residuals[rows:]
+    pull: Array = optimum.jacobian[rows:]
     contradiction = math.sqrt(float(np.mean(apart**2))) if known else 0.0
     r, jacobian = weighted(free, own)
     ridge = ridge_of(r, optimum.u.size)

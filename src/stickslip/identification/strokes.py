@@ -109,7 +109,7 @@ def narrowest_half(experiment: Experiment) -> float:
         if 2 * m + 1 >= q.size:
             break
         stride = max(1, m // 2)
-        centres: Rows = np.arange(m, q.size - m, stride)
+        centres: Rows = np.arange(m, q.size - m, stride, dtype=np.int64)
         acceleration = apply_at(q - q[0], centres, weights)
         if (noise * float(np.linalg.norm(weights))) ** 2 <= NOISE_SHARE * float(np.var(acceleration)):
             return half
@@ -141,7 +141,7 @@ def sliding_record(
     period = 1.0 / rate
     weights = unblurred_weights(max(LEAST_SAMPLES * period, 0.5 * half), period)
     m = weights.shape[1] // 2
-    inner: Rows = np.arange(m, q.size - m)
+    inner: Rows = np.arange(m, q.size - m, dtype=np.int64)
     moved = q - q[0]
     v, a = np.zeros(q.size), np.zeros(q.size)
     v[inner], a[inner] = apply_at(moved, inner, weights).T

@@ -55,9 +55,8 @@ def _seen_in(found: SlidingPosterior, width: int) -> tuple[float, float] | None:
     size = np.linalg.norm(columns, axis=0)
     if columns.shape[0] < 3 * columns.shape[1] or not np.all(size > 0.0):
         return None
-    values: Array = (
-        np.linalg.lstsq(columns / size * root[:, None], fit.torque[mine] * root, rcond=None)[0] / size
-    )
+    solver: Any = np.linalg.lstsq
+    values: Array = solver(columns / size * root[:, None], fit.torque[mine] * root, rcond=None)[0] / size
     inertia, snap, torque = float(values[0]), float(values[5]), float(values[6])
     if torque >= 0.0 or inertia <= 0.0:
         return None
