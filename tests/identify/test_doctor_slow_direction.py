@@ -38,7 +38,7 @@ def record(speeds: tuple[tuple[float, float], ...], sign: float = 1.0, ripple: f
 
 
 def findings(examined: Record) -> dict[str, str]:
-    return {f.code: f.message for f in examine(examined, regress=no_regression).findings}
+    return {f.code: f.message for f in examine(examined, estimate=no_regression).findings}
 
 
 @pytest.mark.parametrize("ripple", [0.0, 0.2])
