@@ -200,8 +200,12 @@ class Search:
         self.on: On = ()
         levels = asked.levels or {}
         usual = usual_alternatives(rows, asked.by_direction)
-        if asked.skew is not None:
-            usual = tuple(a for a in usual if a.unit != "skew")
+        # What is stated is not doubted.
+        usual = tuple(
+            a
+            for a in usual
+            if a.splits not in asked.known and not (a.unit == "skew" and asked.skew is not None)
+        )
         for alternative in (*usual, *registry_for(plain, gravity), *named_orders(levels)):
             self.add(alternative)
         self.on = place_levels(self.alternatives, levels)

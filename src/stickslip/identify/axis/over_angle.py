@@ -40,7 +40,7 @@ from stickslip.machines.servo import ServoAxis
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-FALLS = np.geomspace(0.003, 0.3, 7)
+FALLS = np.array([0.003, 0.03, 0.3])
 """Parts of the highest speed over which friction may fall."""
 SECTORS = 12
 """Of a turn, each of which must be passed in both directions."""
