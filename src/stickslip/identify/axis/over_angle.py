@@ -40,8 +40,8 @@ from stickslip.machines.servo import ServoAxis
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-FALLS = np.array([0.003, 0.03, 0.3])
-"""Parts of the highest speed over which friction may fall."""
+FALLS = np.array([0.03, 0.1])
+"""Parts of the highest speed over which friction may fall; farther it is hardly told from viscous friction."""
 SECTORS = 12
 """Of a turn, each of which must be passed in both directions."""
 RESOLVED = 1.0
