@@ -2,8 +2,8 @@
 
 While the motor is held the load swings at omega; the motor's acceleration a then obeys
 (1 + D²/omega²) (T - F) = J a + Jm/omega² D² a, D = d/dt. So the second derivatives of the torque and of the
-acceleration tell omega and the motor's inertia Jm. They are read in the two narrowest windows, whose difference is how
-unsure they are.
+acceleration tell omega and the motor's inertia Jm. They are read in the two widest windows, where noise of the torque
+biases them least; their difference is how unsure they are.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identification.sliding import PRESENT, SlidingPosterior
+from stickslip.identification.sliding import SlidingPosterior
 from stickslip.machines.two_inertias import TwoInertias
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -27,10 +27,10 @@ MOST_FREQUENCY, MOST_SHARE = 0.25, 0.15
 
 
 def two_inertias(found: SlidingPosterior) -> TwoInertias | None:
-    """Motor and load as the two narrowest windows tell them; None where they do not."""
-    if max(found.presence("elasticity"), found.presence("elasticity of higher order")) < PRESENT:
+    """Motor and load as the two widest windows tell them; None where they do not."""
+    if not found.compliance:
         return None
-    widths = sorted({b.width for b in found.rows.blocks})[:2]
+    widths = sorted({b.width for b in found.rows.blocks})[-2:]
     seen = [_seen_in(found, w) for w in widths]
     if len(seen) < 2 or any(s is None for s in seen):
         return None
