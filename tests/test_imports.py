@@ -53,8 +53,12 @@ def named(node: ast.AST) -> list[str]:
 
 
 def part(module: str) -> str:
-    """The room, or the file of the package, that a module belongs to."""
-    return module.split(".")[1] if module.startswith("stickslip.") else ""
+    """The room, or the file of the package, that a module belongs to.
+
+    `identification` is the part of `identify` that has been written anew: one room until the rest has moved there.
+    """
+    name = module.split(".")[1] if module.startswith("stickslip.") else ""
+    return "identify" if name == "identification" else name
 
 
 @cache

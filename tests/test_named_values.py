@@ -61,7 +61,7 @@ def test_a_value_that_cannot_be_used_is_refused(
 
 
 def test_good_values_are_taken(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(f"{SPRINGS} --torque dry=0.3 --torque -1 --claimed 1,2".split()) == 0
+    assert main(f"{SPRINGS} --torque dry=0.3 --torque -1 --claimed 1".split()) == 0
     assert "twist under 0.3 N·m (dry)" in capsys.readouterr().out
     assert main(f"{SPECTRUM} --mode own=0.95".split()) == 0
 
