@@ -197,9 +197,6 @@ def test_two_models_are_compared(page: Any, served: Served) -> None:
     assert inertia[2:] == ["kg·m²", "0.0 %", "not shown to have changed"]
 
 
-@pytest.mark.xfail(
-    reason="the summary of a long log's plot is not found; the cause is not known yet", strict=False
-)
 def test_a_long_log_is_seen_before_the_doctor_has_done(page: Any, served: Served, tmp_path: Path) -> None:
     """What was zoomed to stays in sight when his findings come; nothing is identified from it before."""
     rng = np.random.default_rng(1)

@@ -91,11 +91,10 @@ def falls_of(rows: SlidingRows, speeds: Array, exponents: Sequence[float] = EXPO
     """Lay out falls of friction at some velocities, with every exponent."""
     speed, exponent = np.tile(speeds, len(exponents)), np.repeat(np.array(exponents), speeds.size)
 
-    def left(r: SlidingRecord) -> Array:
-        ratio: Array = np.abs(r.velocity)[:, None] / speed
-        return np.exp(-np.where(exponent == 2.0, ratio * ratio, ratio**exponent))
+    def left(r: SlidingRecord, fall: int) -> Array:
+        return np.exp(-((np.abs(r.velocity) / speed[fall]) ** exponent[fall]))
 
-    unlike = rows.see(left)
+    unlike = np.column_stack([rows.see(lambda r, fall=k: left(r, fall))[:, 0] for k in range(speed.size)])
     share = np.array([w for e, w in zip(EXPONENTS, EXPONENT_ODDS, strict=True) if e in exponents] or [1.0])
     odds = np.repeat(share, speeds.size) if share.size == len(exponents) else np.ones(speed.size)
     odds = odds * np.where(speed > BEYOND * rows.fastest, BEYOND_ODDS, 1.0)
