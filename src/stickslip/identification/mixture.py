@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.identification.alternatives.disturbance import DISTURBANCE, closed_loop_bias
 from stickslip.identification.posterior import FALL_FORM, SPLIT, Family, Posterior, log_sum
 from stickslip.identification.rows import SlidingRows
 from stickslip.identification.search import Asked, Fit
@@ -159,14 +160,34 @@ def mix(rows: SlidingRows, fits: Sequence[Fit], asked: Asked) -> Mixture:
     total = log_sum(np.concatenate([family.log_evidence[falls] for *_, family, falls in found]))
     head, posterior, readout, family, falls = max(found, key=lambda x: float(np.max(x[3].log_evidence[x[4]])))
     place = int(falls[np.argmax(family.log_evidence[falls])])
-    factor = inflation(rows, head, posterior, readout, family, place, weight)
+    response = response_of(head, posterior, readout, family, place)
+    factor = inflation(rows, response, weight)
+    inertia = posterior.core.names.index("inertia")
+    bias = closed_loop_bias(
+        response.residual, response.gain[:, inertia], weight, float(family.mean[place][inertia])
+    )
     least = np.log(NEGLIGIBLE) + float(family.log_evidence[place]) - total
     members = [
         m for f, p, r, fam, at in found for m in members_of(f, p, r, fam, at, total, least, asked, factor)
     ]
+    members = [x for m in members for x in with_disturbance(m, bias)]
     whole = sum(m.weight for m in members)
-    scaled = [Member(m.weight / whole, m.mean, m.std, m.covariance, m.on, m.vs, m.exponent) for m in members]
+    scaled = [replace(m, weight=m.weight / whole) for m in members]
     return Mixture(readout.names, tuple(scaled), speeds, head, posterior, family, place)
+
+
+def with_disturbance(member: Member, bias: Array) -> tuple[Member, Member]:
+    """Return a member without a disturbance and one with it: any part of the bias is then as likely as another."""
+    covariance = member.covariance + np.outer(bias, bias) / 12.0
+    disturbed = replace(
+        member,
+        weight=member.weight * DISTURBANCE.odds,
+        mean=member.mean + 0.5 * bias,
+        std=np.sqrt(np.maximum(np.diag(covariance), 0.0)),
+        covariance=covariance,
+        on=member.on | {DISTURBANCE.name},
+    )
+    return replace(member, weight=member.weight * (1.0 - DISTURBANCE.odds)), disturbed
 
 
 def members_of(
@@ -207,16 +228,29 @@ def members_of(
         yield Member(float(np.exp(weight)), mean, std, covariance, on, vs, exponent)
 
 
-def inflation(
-    rows: SlidingRows,
-    fit: Fit,
-    posterior: Posterior,
-    readout: Readout,
-    family: Family,
-    place: int,
-    weight: Array,
-) -> Array:
-    """By how much standard deviations from scores summed by stroke, or by state, exceed the posterior's, shape (k,)."""
+class Response(NamedTuple):
+    """How the numbers of the likeliest member respond to its misfit.
+
+    Attributes
+    ----------
+    residual : array, shape (n,)
+        Torque that it does not explain.
+    columns : array, shape (n, p)
+        Of its coefficients, those of the fall last.
+    gain : array, shape (k, p)
+        Change of the numbers with ``columns.T @ (weight * residual)``.
+    std : array, shape (k,)
+        Standard deviations of the numbers in the posterior.
+    """
+
+    residual: Array
+    columns: Array
+    gain: Array
+    std: Array
+
+
+def response_of(fit: Fit, posterior: Posterior, readout: Readout, family: Family, place: int) -> Response:
+    """Return how the numbers of one member respond to its misfit."""
     columns, covariance, combined = posterior.matrix, family.base, readout.rows
     if place:
         falls = posterior.falls
@@ -225,17 +259,22 @@ def inflation(
         combined = np.hstack([combined, fall])
         g, c = family.gain[place], family.spread[place]
         covariance = np.block([[family.base + g @ c @ g.T, -g @ c], [-c @ g.T, c]])
-    residual = fit.torque - posterior.predicted(family, place)
-    own = combined @ covariance
-    plain = np.sqrt(np.maximum(np.einsum("kp,kp->k", own, combined), 1e-300))
-    score = (columns * (weight * residual)[:, None]) @ own.T
+    gain = combined @ covariance
+    std = np.sqrt(np.maximum(np.einsum("kp,kp->k", gain, combined), 1e-300))
+    return Response(fit.torque - posterior.predicted(family, place), columns, gain, std)
+
+
+def inflation(rows: SlidingRows, response: Response, weight: Array) -> Array:
+    """By how much standard deviations from scores summed by stroke, or by state, exceed the posterior's, shape (k,)."""
+    score = (response.columns * (weight * response.residual)[:, None]) @ response.gain.T
     state = np.digitize(rows.velocity / rows.largest[0], STATES) * (STATES.size + 1)
     state = (state + np.digitize(rows.acceleration / rows.largest[1], STATES)) * len(rows.blocks) + rows.block
-    factor = np.ones(len(readout.names))
+    factor = np.ones(response.std.size)
     for cluster in (rows.stroke, state):
         groups = np.unique(cluster, return_inverse=True)[1]
         count = int(groups.max()) + 1
         sums = np.zeros((count, score.shape[1]))
         np.add.at(sums, groups, score)
-        factor = np.fmax(factor, np.sqrt(np.sum(sums**2, axis=0) * count / max(count - 1, 1)) / plain)
+        spread = np.sqrt(np.sum(sums**2, axis=0) * count / max(count - 1, 1))
+        factor = np.fmax(factor, spread / response.std)
     return factor

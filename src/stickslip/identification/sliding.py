@@ -17,6 +17,7 @@ import numpy as np
 from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
 from stickslip.identification.alternatives.alternative import Alternative
+from stickslip.identification.alternatives.disturbance import DISTURBANCE
 from stickslip.identification.mixture import NEGLIGIBLE, Member, Mixture, mix
 from stickslip.identification.posterior import EXPONENT_ODDS, EXPONENTS
 from stickslip.identification.rows import LATEST, SlidingRows, sample_rows, sliding_rows
@@ -120,15 +121,14 @@ class SlidingPosterior:
         """Value and interval of every number, the velocity ``vs`` of friction's fall among them where one is likely."""
         mean, std = np.array([m.mean for m in self.members]), np.array([m.std for m in self.members])
         out = {
-            n: Number(float(self.weights @ mean[:, k]), *quantiles(mean[:, k], self.width * std[:, k], self.weights))
+            n: Number(*quantiles(mean[:, k], self.width * std[:, k], self.weights))
             for k, n in enumerate(self.names)
-        }  # fmt: skip
+        }
         falls = np.array([m.vs for m in self.members])
         has = np.isfinite(falls)
         if has.any():
             share, log = self.weights[has] / self.weights[has].sum(), np.log(falls[has])
-            ends = np.exp(quantiles(log, np.full(log.size, self.spacing), share))
-            out["vs"] = Number(float(np.exp(share @ log)), float(ends[0]), float(ends[1]))
+            out["vs"] = Number(*np.exp(quantiles(log, np.full(log.size, self.spacing), share)).tolist())
         return out
 
     def interval(self, name: str) -> tuple[float, float]:
@@ -146,7 +146,7 @@ class SlidingPosterior:
     @property
     def alternatives(self) -> dict[str, Alternative]:
         """Every alternative that was weighed, by its name."""
-        return {a.name: a for f in self.fits for a in f.alternatives}
+        return {a.name: a for a in (DISTURBANCE, *(a for f in self.fits for a in f.alternatives))}
 
     @property
     def falls(self) -> float:
@@ -319,8 +319,8 @@ def posterior_of(rows: SlidingRows, fits: Sequence[Fit], found: Mixture) -> Slid
     )  # fmt: skip
 
 
-def quantiles(mean: Array, std: Array, weight: Array, part: float = 0.025) -> tuple[float, float]:
-    """Ends of the central interval of a mixture of normal distributions of 95 % half-widths `std`, by bisection.
+def quantiles(mean: Array, std: Array, weight: Array) -> tuple[float, float, float]:
+    """Return median and ends of the central 95 % interval of a mixture of normal distributions, by bisection.
 
     Parameters
     ----------
@@ -331,7 +331,7 @@ def quantiles(mean: Array, std: Array, weight: Array, part: float = 0.025) -> tu
 
     std = np.maximum(std, 1e-12 * float(np.max(np.abs(mean))) + 1e-300) / QUANTILE
     out: list[float] = []
-    for goal in (part, 1.0 - part):
+    for goal in (0.5, 0.025, 0.975):
         low, high = float(np.min(mean - 8.0 * std)), float(np.max(mean + 8.0 * std))
         for _ in range(60):
             middle = 0.5 * (low + high)
@@ -340,4 +340,4 @@ def quantiles(mean: Array, std: Array, weight: Array, part: float = 0.025) -> tu
             else:
                 high = middle
         out.append(0.5 * (low + high))
-    return out[0], out[1]
+    return out[0], out[1], out[2]

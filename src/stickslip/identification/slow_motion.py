@@ -432,7 +432,7 @@ def mix_minima(minima: Sequence[Minimum], probabilities: Sequence[float]) -> Law
         # A positive number's interval is one of its logarithm.
         positive = bool(np.all(ends > 0.0))
         ends = np.log(ends) if positive else ends
-        low, high = quantiles(ends.mean(axis=1), 0.5 * (ends[:, 1] - ends[:, 0]), share)
+        _, low, high = quantiles(ends.mean(axis=1), 0.5 * (ends[:, 1] - ends[:, 0]), share)
         low, high = (math.exp(low), math.exp(high)) if positive else (low, high)
         mixed = judged(parameters[e.name], e.value, low, high, best.level)
         found.append(mixed if e.identified else replace(mixed, identified=False, verdict=e.verdict))
