@@ -373,10 +373,35 @@ class Minimum:
     criterion: Criterion
     u: Array
 
+    def squares_of(self, other: Minimum) -> Array:
+        """Return the squares of another minimum, whitened and weighed as this one, shape (n,)."""
+        return replace(self.criterion, vector=other.criterion.vector, prior=None).residuals(other.u) ** 2
+
+    def prior_of(self, other: Minimum) -> float:
+        """Return by how much another minimum contradicts the steady friction of sliding, a sum of squares."""
+        prior = other.criterion.prior
+        own = replace(self.criterion, vector=other.criterion.vector, prior=prior)
+        return (
+            0.0
+            if prior is None
+            else float(np.sum((prior.root @ (own.prior_seen(other.u) - prior.mean)) ** 2))
+        )
+
     def cost_of(self, other: Minimum) -> float:
         """Return the sum of squares of another minimum under this one's weights."""
-        vector, prior = other.criterion.vector, other.criterion.prior
-        return replace(self.criterion, vector=vector, prior=prior).cost(other.u)
+        return float(np.sum(self.squares_of(other))) + self.prior_of(other)
+
+    def log_odds(self, other: Minimum, prior: float) -> float:
+        """Return the log odds of another minimum against this one, after `prior` log odds.
+
+        The difference of both log likelihoods is as sure as that of the segments of time it adds up from (Vuong 1989);
+        odds are averaged over what it may be (MacKay 1992).
+        """
+        apart = 0.5 * (self.squares_of(self) - self.squares_of(other))
+        segments = np.bincount(self.criterion.blocks(BLOCK), apart)
+        variance = segments.size * float(np.var(segments, ddof=1))
+        known = 0.5 * (self.prior_of(self) - self.prior_of(other))
+        return (prior + known + float(np.sum(segments))) / math.sqrt(1.0 + math.pi * variance / 8.0)
 
 
 def fit_minimum(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any]) -> Minimum:
@@ -413,12 +438,9 @@ def fit_minimum(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, 
 
 
 def mix_minima(minima: Sequence[Minimum], probabilities: Sequence[float]) -> LawFit:
-    """The likeliest fit with the intervals of the mixture over all of them.
-
-    The likelihood of slow motion counts as its standard deviations do: as of `UNMODELLED` squared times fewer rows.
-    """
-    cost = np.array([minima[0].cost_of(m) for m in minima])
-    log_weight = np.log(probabilities) - 0.5 * cost / UNMODELLED**2
+    """The likeliest fit with the intervals of the mixture over all of them."""
+    prior = np.log(np.array(probabilities) / probabilities[0])
+    log_weight = np.array([minima[0].log_odds(m, x) for m, x in zip(minima, prior.tolist(), strict=True)])
     share = np.exp(log_weight - log_sum(log_weight))
     best = minima[int(np.argmax(share))].law_fit
     parameters = {p.name: p for p in best.vector.free}
