@@ -20,6 +20,7 @@ from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.nearest import Curve, Form, Nearest, carried, curve_of
 from stickslip.export.target import Setting, Target, settings_of
+from stickslip.messages import name_setting
 from stickslip.model import Model
 
 ENTRIES = 20
@@ -54,7 +55,7 @@ def listed(job: Job) -> tuple[Nearest, dict[str, Any]]:
     settings = settings_of(TARGET, job.settings)
     motion = str(settings["motion"])
     if motion not in UNITS:
-        raise InputError(f"--set motion={motion}: choose rotary or linear")
+        raise InputError(f"{name_setting('motion', motion)}: choose rotary or linear")
     unit = float(settings["torque_per_unit"])
     found = carried(job, TARGET.name, [form_of(motion, unit, curve_of(job).size)])
     p = found.model.parameters
@@ -104,10 +105,12 @@ def delay_of(job: Job, given: str, motion: str) -> int:
         try:
             delay = int(given)
         except ValueError:
-            raise InputError(f"--set position_delay={given}: give a whole number, or auto") from None
+            raise InputError(
+                f"{name_setting('position_delay', given)}: give a whole number, or auto"
+            ) from None
         if not 0 <= delay <= LONGEST_DELAY:
             raise InputError(
-                f"--set position_delay={given}: it lies between 0 and {LONGEST_DELAY} (P-COMP-00043)"
+                f"{name_setting('position_delay', given)}: it lies between 0 and {LONGEST_DELAY} (P-COMP-00043)"
             )
         return delay
     curve = curve_of(job)

@@ -15,6 +15,7 @@ from stickslip.export._analysis import merged
 from stickslip.export.golden import Samples, changing, random_motion, sampled_torques
 from stickslip.export.job import IDENTIFIER, Check, Export
 from stickslip.export.nearest import read_by
+from stickslip.messages import name_option
 from stickslip.spec import Surroundings
 from stickslip.subset import named
 
@@ -46,7 +47,7 @@ def checked_name(name: str) -> str:
     """
     if not IDENTIFIER.fullmatch(name):
         raise InputError(
-            f"{name!r} is no name in most languages; use letters, digits and _, a letter first (--name)"
+            f"{name!r} is no name in most languages; use letters, digits and _, a letter first ({name_option('name')})"
         )
     return name
 

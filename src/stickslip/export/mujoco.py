@@ -33,6 +33,7 @@ from stickslip.export.nearest import (
     with_constant,
 )
 from stickslip.export.target import Setting, Target, settings_of
+from stickslip.messages import name_setting
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
@@ -145,7 +146,7 @@ def for_timestep(found: Nearest, step: float, inertia: float, contact: str) -> t
     the natural frequency of axis and bristle at most one over the step, and twice the damping of the bound.
     """
     if contact not in ("identified", "held"):
-        raise InputError(f"--set contact={contact}: give identified or held")
+        raise InputError(f"{name_setting('contact', contact)}: give identified or held")
     model, bound = found.model, holding_step(found.model)
     if step < bound:
         return model, found.notes
@@ -155,7 +156,7 @@ def for_timestep(found: Nearest, step: float, inertia: float, contact: str) -> t
     if contact == "identified":
         warning = (
             f"at a timestep of {step:g} s MuJoCo does not hold this contact at rest: it oscillates, and drifts under a "
-            f"load. It takes a timestep below {bound:.3g} s, or --set contact=held, which bends "
+            f"load. It takes a timestep below {bound:.3g} s, or {name_setting('contact', 'held')}, which bends "
             f"{p.fs / soft:.3g} rad before it breaks away instead of {p.fs / p.sigma0:.3g} rad"
         )
         return model, (*found.notes, warning)

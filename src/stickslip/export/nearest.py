@@ -23,6 +23,7 @@ from stickslip.export._analysis import fields_read
 from stickslip.export._sliding import Curve
 from stickslip.export._text import folded
 from stickslip.export.job import CannotCarry, Job
+from stickslip.messages import name_option
 from stickslip.model import Model
 from stickslip.spec import Bristle, Law, Mode
 from stickslip.subset import law_layouts, named
@@ -269,7 +270,8 @@ def carried(job: Job, target: str, forms: Sequence[Form], also_lost: Sequence[st
         return best
     raise CannotCarry(
         f"{target} carries {best.form.words}; {job.model.law.name} would lose {'; '.join(best.lost)}. The nearest is "
-        f"{best.values}: {best.error}; --top-speed gives another highest velocity. Take it with --nearest"
+        f"{best.values}: {best.error}; {name_option('top_speed')} gives another highest velocity. Take it with "
+        f"{name_option('nearest', True)}"
     )
 
 

@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from stickslip.identification.sliding import PRESENT, SlidingPosterior
+from stickslip.messages import name_option
 
 KNOWN_DELAY = 0.25
 """Rows: half-width of a delay up to which it is worth a sentence."""
@@ -17,7 +18,7 @@ KINDS = (
     (-0.5, "a mean over the row before"),
 )
 ALLOWED = ("elasticity", "elasticity of higher order", "play", "inertia by frequency", "no single inertia")
-CONTRADICTED = "The record contradicts the timing given (--torque-is, --delay)"
+CONTRADICTED = f"The record contradicts the timing given ({name_option('torque_is')}, {name_option('delay')})"
 """How the sentence begins that says so."""
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import UnknownName
+from stickslip.messages import render, rendered
 from stickslip.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -55,6 +56,9 @@ class Estimate:
     verdict: str = ""
     cause: str = ""
     share: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "verdict", render(self.verdict))
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -184,6 +188,10 @@ class Identification:
     details: Mapping[str, Any] = field(default_factory=dict[str, Any])
     findings: tuple[Any, ...] = ()
     held: tuple[Held, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "notes", rendered(self.notes))
+        object.__setattr__(self, "measure_next", rendered(self.measure_next))
 
     def __getitem__(self, name: str) -> Estimate:
         for estimate in self.estimates:

@@ -24,6 +24,7 @@ from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.identify.motion import speeds_of
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import name_option, render, rendered
 from stickslip.record import Record
 from stickslip.report.next_steps import Step, next_steps
 from stickslip.report.plots import quantity
@@ -76,6 +77,11 @@ class Answers:
     steps: tuple[Step, ...]
     told: tuple[str, ...]
     doubts: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "trust", render(self.trust))
+        for name in ("friction", "evidence", "told", "doubts"):
+            object.__setattr__(self, name, rendered(getattr(self, name)))
 
     def as_dict(self) -> dict[str, Any]:
         """Trust, doubts and evidence as plain data for JSON and TOML."""
@@ -225,7 +231,10 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
             f"{mostly_waves(found, sliding)}"
         )
     if sliding is not None and beaten(sliding):
-        better = f"plain least squares (--inverse) explains the {effort} better where the axis slides"
+        better = (
+            f"plain least squares ({name_option('inverse', True)}) explains the {effort} better where the "
+            "axis slides"
+        )
         out.append(f"{better}{beside_held_inertia(found, unit_in(found, 'kg·m²'))}")
     fall = missing_fall(found.misfit)
     if fall > 0.0 and found.model is not None:
@@ -249,7 +258,8 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
         drift = drift_of(posterior)
         if drift is not None and abs(drift.share) >= DRIFTS_BY:
             out.append(
-                f"friction {drift} over the record: warm the axis up first, or cut with --from and --to"
+                f"friction {drift} over the record: warm the axis up first, or cut with {name_option('start')} "
+                f"and {name_option('end')}"
             )
     # Whose numbers they are is for the reader to say: each is named here.
     out += dict.fromkeys(f.message for f in warned if f.code == "saved-numbers")
@@ -339,7 +349,7 @@ def either_way(found: Identification) -> list[str]:
         return []
     return [
         f"The constant torque may as well be friction that is {percent(2.0 * abs(offset.value) / level)} of its level "
-        "greater in one direction; --per-direction gives each its own."
+        f"greater in one direction; {name_option('per_direction', True)} gives each its own."
     ]
 
 

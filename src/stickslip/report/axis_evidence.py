@@ -15,6 +15,7 @@ from stickslip.identify.estimate import Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.noise import white_std
 from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.messages import name_option
 from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
@@ -126,7 +127,8 @@ def judgements(found: Identification) -> dict[str, str]:
             out[f"{signal}_relative"] = beside(rms, level, what.get(signal, "the noise of the signal"))
         told = out["position_relative"]
         if told and not told.startswith("good") and not all(t.closed_loop for t in experiments):
-            out["position_relative"] = f"{told}: the recorded torque alone lets it drift (--loop holds it)"
+            drifts = f"the recorded torque alone lets it drift ({name_option('loop')} holds it)"
+            out["position_relative"] = f"{told}: {drifts}"
         if inverse is not None:
             # Its filters round every reversal: even the true axis leaves some per cent.
             out["inverse_dynamics_relative"] = "a first look, from which the search starts"

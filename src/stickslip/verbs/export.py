@@ -25,6 +25,7 @@ from stickslip.export.on_a_line import along_a_line, is_linear, tried
 from stickslip.export.target import Target, settings_of
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.rigid import RigidAxis
+from stickslip.messages import name_option, rendered
 from stickslip.model import Model
 from stickslip.rules import with_article
 from stickslip.spec import Surroundings
@@ -74,6 +75,9 @@ class ExportResult:
     notes: tuple[str, ...] = ()
     check: Check | None = None
     paths: tuple[Path, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "notes", rendered(self.notes))
 
     @arguments_checked
     def save(self, folder: str | os.PathLike[str]) -> ExportResult:
@@ -191,7 +195,7 @@ def export(
         return saved(exported_map(source, to, name or "cogging", settings, asked), folder)
     chosen = target_named(to)
     if single and not chosen.precision:
-        raise InputError(f"--single: {chosen.name} supports only one precision; leave it out")
+        raise InputError(f"{name_option('single')}: {chosen.name} supports only one precision; leave it out")
     options = CompensatorOptions(
         sample_time, substeps, gain, lead, deadband, offset, inertia_feedforward, filter_hz
     )
@@ -208,10 +212,11 @@ def export(
     content = content_of(source)
     own, renamed = named(chosen, name, content)
     if compensator is None and options.given:
-        option = options.given[0].replace("_", "-")
-        raise InputError(f"--{option} belongs to --compensator; give both or neither")
+        raise InputError(
+            f"{name_option(options.given[0])} belongs to {name_option('compensator')}; give both or neither"
+        )
     if nearest and not chosen.forms:
-        raise InputError(f"--nearest: {chosen.name} carries {chosen.carries}; leave it out")
+        raise InputError(f"{name_option('nearest')}: {chosen.name} carries {chosen.carries}; leave it out")
     if controller or compensator:
         settings_of(chosen, settings or {})
         result = exported_controller(source, content, chosen, own, options, compensator, single, check)
@@ -248,7 +253,7 @@ def exported_map(
     """A torque over the angle; `asked` are options that it has none of."""
     for option, given in asked.items():
         if given:
-            raise InputError(f"--{option}: a torque over the angle has none; leave it out")
+            raise InputError(f"{name_option(option)}: a torque over the angle has none; leave it out")
     target = map_target(to)
     made = written(map_in(source, to), target, name, settings)
     return ExportResult(target, name, made.files, (*made.notes, f"tried: {target.tried}"))
@@ -315,10 +320,14 @@ def refuse_controllers(chosen: Target, controller: bool, compensator: str | None
     for option, asked in (("controller", controller), ("compensator", compensator)):
         if asked and chosen.name not in CONTROLLER_TARGETS:
             raise InputError(
-                f"--{option}: {chosen.name} supports the law alone; leave it out, or use --to c99"
+                f"{name_option(option)}: {chosen.name} supports the law alone; leave it out, or use "
+                f"{name_option('to', 'c99')}"
             )
     if controller and compensator:
-        raise InputError("--controller takes the compensator of its file; leave --compensator out")
+        raise InputError(
+            f"{name_option('controller')} takes the compensator of its file; leave "
+            f"{name_option('compensator')} out"
+        )
 
 
 def refuse_missing(source: Source) -> None:

@@ -14,6 +14,7 @@ from stickslip.export.job import Job
 from stickslip.export.nearest import read_by
 from stickslip.export.target import Target
 from stickslip.machines.angle import AngleMap
+from stickslip.messages import name_option
 
 SLOW = 0.02
 """s: sample times above it are told; a tenth of a period of 5 Hz."""
@@ -56,7 +57,7 @@ def notes_on_controller(
         yield (
             f"a sample time of {time:g} s compensates a reversal up to {time:g} s late, and a loop tolerates it "
             "up to some "
-            f"{0.1 / time:.2g} Hz only; give --sample-time in seconds"
+            f"{0.1 / time:.2g} Hz only; give {name_option('sample_time')} in seconds"
         )
     if compensator == "recommended":
         found = recommended_in(content)

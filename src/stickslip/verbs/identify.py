@@ -28,6 +28,7 @@ from stickslip.identify.held import held_in
 from stickslip.identify.methods import method_named, methods_by_option
 from stickslip.identify.methods.method import Method, Options, given_in
 from stickslip.identify.on_a_line import along_a_line, worded
+from stickslip.messages import name_loop, name_option, name_parameter, render
 from stickslip.model import Model
 from stickslip.readers.convert import pendulum_before_gear
 from stickslip.readers.cut import file_rows
@@ -196,7 +197,7 @@ def identify(
     if method == "axis" and friction_alone(records, options):
         kind = method_named("hysteresis")
         why = "the friction itself is recorded, and no torque of a drive"
-        tell(f"{why}: --method hysteresis is taken, a law along the motion")
+        tell(render(f"{why}: {name_option('method', 'hysteresis')} is taken, a law along the motion"))
         kind.refuse_unused(given, methods_by_option())
     kind.refuse_unknown(options)
     kind.check(records, options)
@@ -244,7 +245,9 @@ def identified(kind: Method, sources: Sequence[Source], options: Options) -> Ide
         if not spiky:
             raise
         name, message = spiky[0]
-        raise InputError(f"{error}; in {name} {message}: first try --leave-out spikes") from error
+        raise InputError(
+            f"{error.message}; in {name} {message}: first try {name_option('leave_out', 'spikes')}"
+        ) from error
 
 
 def with_pendulum(source: Source) -> list[Finding]:
@@ -285,7 +288,10 @@ def laws_of(law: str | Law | Sequence[str | Law] | None) -> tuple[tuple[str | La
     names = plugins.law_names()
     tried = [name for name in names if plugins.law(name).steady]
     left_out = ", ".join(name for name in names if name not in tried)
-    said = f"Not among all laws, as they say no torque at constant velocity: {left_out}; name one with --law."
+    said = (
+        f"Not among all laws, as they say no torque at constant velocity: {left_out}; name one with "
+        f"{name_option('law')}."
+    )
     return (*tried, *(x for x in asked if x != "all" and x not in tried)), [said] if left_out else []
 
 
@@ -314,7 +320,7 @@ def sources_of(
         except InputError as error:
             if number < fitted:
                 raise
-            raise InputError(f"--hold-out: {error}") from None
+            raise InputError(f"{name_option('hold_out')}: {error.message}") from None
         every = doctor(opened.record)
         short = Path(name).name if log is not None and name != "the log" else f"log {number + 1}"
         names = [short]
@@ -347,11 +353,12 @@ def loops_of(loop: Loops, count: int) -> list[str]:
     every = [loop] if isinstance(loop, (str, Mapping)) else list(loop)
     if len(every) > 1 and len(every) != count:
         raise InputError(
-            f"--loop is given {len(every)} times for {count} LOGs; give it once, or once for each"
+            f"{name_option('loop')} is given {len(every)} times for {count} LOGs; give it once, or once for each"
         )
     if not all(every):
         raise InputError(
-            f"--loop: {loop!r} names no gain; give them, such as --loop kp=8,kd=0.08, or leave it out"
+            f"{name_option('loop')}: {loop!r} names no gain; give them, such as {name_loop('kp=8,kd=0.08')}, or "
+            "leave it out"
         )
     texts = [loop_text(x) for x in every]
     return texts if len(texts) > 1 else texts * count
@@ -402,8 +409,8 @@ def assumptions(found: Identification, options: Options, method: str) -> list[st
     if not values:
         return []
     listed = ", ".join(f"{name} = {', '.join(f'{x:.4g}' for x in own)}" for name, own in values.items())
-    fit = "; --free NAME fits one" if method == "axis" else ""
-    return [f"Assumed, not fitted: {listed}{fit}, --set NAME=VALUE takes another."]
+    fit = f"; {name_option('free', 'NAME')} fits one" if method == "axis" else ""
+    return [f"Assumed, not fitted: {listed}{fit}, {name_parameter('NAME', 'VALUE')} takes another."]
 
 
 def load_note(records: Sequence[Record], found: Identification) -> list[str]:

@@ -31,6 +31,7 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.jackknife import leave_blocks_out
 from stickslip.identify.fit.noise import white_std
 from stickslip.identify.fit.student import student_quantile
+from stickslip.messages import name_option
 from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 
@@ -139,7 +140,8 @@ def doubt(name: str, shown: ShownGains) -> str:
     why = (
         "every gain shown is negative: the recorded signal's sign may be turned."
         if shown.turned
-        else "check --loop, its period too; a filter or a feedforward in the controller can look like this as well."
+        else f"check {name_option('loop')}, its period too; a filter or a feedforward in the controller can "
+        "look like this as well."
     )
     which = " (as a PID)" if shown.cascade else ""
     return (

@@ -18,6 +18,7 @@ from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.sliding.levels import slope_of
+from stickslip.messages import name_option
 from stickslip.record import Record, encoder_step
 
 WINDOW = 0.02
@@ -205,7 +206,8 @@ def ramp_notes(found: int, ramps: int) -> list[str]:
         return [f"{found - ramps} of them followed no torque ramp from rest, and may lie elsewhere."]
     return [
         f"Only {ramps} of them followed a torque ramp from rest, so that nothing counts as identified: is it the "
-        "record of a motion? Then take --method axis. In a break-away record the torque rises slowly while the "
+        f"record of a motion? Then take {name_option('method', 'axis')}. In a break-away record the torque "
+        "rises slowly while the "
         "axis rests until it moves, then goes back until it rests (`stickslip rig run breakaway`). Where it was ramped "
         f"from a torque held, less than {1.0 - RAMP:.0%} of the break-away torque is to be held for it to count."
     ]
@@ -219,7 +221,7 @@ def count_notes(records: Sequence[Record], threshold: float) -> list[str]:
         return []
     return [
         f"Fewer than {COUNTS:g} counts of the encoder within {WINDOW:g} s pass the threshold, so that creep or noise "
-        f"may be taken for a break-away: try --threshold {enough:.2g}."
+        f"may be taken for a break-away: try {name_option('threshold', f'{enough:.2g}')}."
     ]
 
 

@@ -13,8 +13,9 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.uncertainty import Fit
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.identify.sliding.torques import OFFSET
+from stickslip.messages import name_frozen
 
-LEVEL = "or give --freeze offset=0 if nothing but friction acts (a level axis)"
+LEVEL = f"or give {name_frozen('offset', 0)} if nothing but friction acts (a level axis)"
 BOTH = f"move in both directions, {LEVEL}"
 
 
