@@ -340,11 +340,19 @@ def units_of_axis(linear: bool) -> Generator[None]:
         _linear.reset(token)
 
 
-LINEAR = (("kg·m²", "kg"), ("kg*m^2", "kg"), ("N·m", "N"), ("N*m", "N"), ("N.m", "N"), ("rad", "m"))
+LINEAR = (
+    ("kg·m²", "kg"),
+    ("kg*m^2", "kg"),
+    ("kg.m2", "kg"),
+    ("N·m", "N"),
+    ("N*m", "N"),
+    ("N.m", "N"),
+    ("rad", "m"),
+)
 """Units of a rotary axis, in the spellings of text, ASCII and Modelica, and those of a linear axis."""
 
 
-def unit(angular: str) -> str:
+def axis_unit(angular: str) -> str:
     """Return a unit of a rotary axis in the units of the present axis (`units_of_axis`): N·m/rad, or N/m."""
     return in_linear_units(angular) if _linear.get() else angular
 

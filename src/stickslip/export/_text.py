@@ -14,6 +14,8 @@ import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from stickslip.messages import axis_unit
+
 if TYPE_CHECKING:
     import jinja2
 
@@ -99,7 +101,7 @@ def _environment() -> jinja2.Environment:
             return value
         return Code(text_in(str(context.name).removesuffix(".j2").rpartition(".")[2], value))
 
-    return jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.PackageLoader("stickslip.export"),
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
@@ -107,6 +109,8 @@ def _environment() -> jinja2.Environment:
         autoescape=True,  # of what `printed` returns nothing is escaped; macros and includes stay as they are
         finalize=printed,
     )
+    environment.globals["unit"] = axis_unit
+    return environment
 
 
 def render(template: str, **values: Any) -> str:
@@ -136,6 +140,15 @@ def in_lines(equation: str) -> list[str]:
     return textwrap.wrap(folded(equation), 110, break_long_words=False)
 
 
+STATED = re.compile(r"(?<=[,.] )(?:N·m(?:/s)?|rad(?:[/·]s²?)?|kg·m²)(?=[,.:;]|$)")
+"""A unit as docstrings of laws state it: after a comma or a full stop, and before the next one."""
+
+
 def first_line(text: str) -> str:
-    """The summary of a docstring."""
-    return text.strip().splitlines()[0] if text.strip() else ""
+    """Return the summary of a docstring, its units those of the present axis."""
+    return in_units_of_axis(text.strip().splitlines()[0]) if text.strip() else ""
+
+
+def in_units_of_axis(text: str) -> str:
+    """Return a docstring with the units that it states written for the present axis."""
+    return STATED.sub(lambda found: axis_unit(found[0]), text)

@@ -17,7 +17,7 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.motion import Motion, motion_in
 from stickslip.machines.identified import train_in
 from stickslip.machines.two_inertias import TwoInertias
-from stickslip.messages import name_file
+from stickslip.messages import in_linear_units, name_file
 from stickslip.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -68,9 +68,7 @@ class Identified:
 
     def unit(self, angular: str) -> str:
         """A unit of the angular system in the axis's own."""
-        if self.motion == "rotary":
-            return angular
-        return angular.replace("kg·m²", "kg").replace("N·m", "N").replace("rad", "m")
+        return angular if self.motion == "rotary" else in_linear_units(angular)
 
     @property
     def sampled(self) -> tuple[float, str]:

@@ -12,7 +12,7 @@ from typing import Any
 
 from stickslip.arguments import no_number
 from stickslip.errors import ParameterError
-from stickslip.messages import name_option
+from stickslip.messages import in_linear_units, name_option
 from stickslip.rules import is_number
 
 SIDES = ("motor", "load")
@@ -164,6 +164,4 @@ class ServoAxis:
 
     def unit(self, angular: str) -> str:
         """A unit of the angular system in the axis's own: N·m becomes N, rad becomes m, kg·m² becomes kg."""
-        if self.motion == "rotary":
-            return angular
-        return angular.replace("kg·m²", "kg").replace("N·m", "N").replace("rad", "m")
+        return angular if self.motion == "rotary" else in_linear_units(angular)

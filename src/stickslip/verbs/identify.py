@@ -27,8 +27,7 @@ from stickslip.identify.experiment import DRIVES
 from stickslip.identify.held import held_in
 from stickslip.identify.methods import method_named, methods_by_option
 from stickslip.identify.methods.method import Method, Options, given_in
-from stickslip.identify.on_a_line import along_a_line, worded
-from stickslip.messages import name_loop, name_option, name_parameter, render
+from stickslip.messages import name_loop, name_option, name_parameter, render, units_of_axis
 from stickslip.model import Model
 from stickslip.readers.convert import pendulum_before_gear
 from stickslip.readers.cut import file_rows
@@ -203,7 +202,9 @@ def identify(
     kind.check(records, options)
     examiner.warn(sources)
     progress(f"method {kind.name}, {sum(len(r) for r in records)} samples")
-    found = with_notes(identified(kind, sources, options), kind, records, options, left_out)
+    with units_of_axis(all(is_linear(r) for r in records)):
+        found = identified(kind, sources, options)
+    found = with_notes(found, kind, records, options, left_out)
     found = replace(found, findings=tuple(f for s in sources for f in s.findings))
     return IdentificationResult(found, tuple(sources), law_file(found, () if inverse else laws))
 
@@ -261,9 +262,9 @@ def with_notes(
     found: Identification, kind: Method, records: Sequence[Record], options: Options, more: Sequence[str]
 ) -> Identification:
     """What was found in the units of the records, with what a reader must know of it."""
-    if all(is_linear(r) for r in records):
+    if all(is_linear(r) for r in records) and kind.name not in ("axis", "inertia"):
         # Those two know their axis: their numbers have its units.
-        found = worded(found) if kind.name in ("axis", "inertia") else along_a_line(found)
+        found = found.of_linear_axis()
     found = replace(found, estimates=without_inverted_rest(found.estimates))
     said = (
         *assumptions(found, options, kind.name),

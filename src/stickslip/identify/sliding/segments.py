@@ -17,7 +17,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.sliding.levels import Level, find_levels, level_runs, slope_of
 from stickslip.identify.sliding.points import SlidingPoints
-from stickslip.messages import name_option
+from stickslip.messages import axis_unit, name_option
 from stickslip.record import Record, encoder_step
 from stickslip.rigs.procedures.resting import RESTING, resting
 
@@ -355,11 +355,12 @@ def _notes(
     return notes
 
 
-def _listed_drops(dropped: Sequence[Dropped], unit: str = "rad/s") -> str:
+def _listed_drops(dropped: Sequence[Dropped], unit: str = "") -> str:
     """What was dropped, those for one reason together."""
     reasons: dict[str, list[float]] = {}
     for d in dropped:
         reasons.setdefault(d.why, []).append(d.velocity)
+    unit = unit or axis_unit("rad/s")
     parts = [f"{_listed(v)} {unit} ({why})" for why, v in list(reasons.items())[:NAMED]]
     more = sum(len(v) for v in list(reasons.values())[NAMED:])
     return "; ".join(parts) + (f"; {more} more" if more else "")
