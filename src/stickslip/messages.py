@@ -129,6 +129,30 @@ def _reference(kind: str, *parts: object) -> str:
     return f"{START}{SEPARATOR.join((kind, *map(str, parts)))}{END}"
 
 
+class Note(str):
+    """A message with a code, by which programs recognize it.
+
+    Parameters
+    ----------
+    text : str
+    code : str
+        Stable, such as "timing-contradicted".
+    """
+
+    code: str
+
+    def __new__(cls, text: str, code: str = "") -> Note:
+        """Make a message of a text."""
+        made = super().__new__(cls, text)
+        made.code = code
+        return made
+
+
+def code_of(text: str) -> str:
+    """Return the code of a message; empty for one without."""
+    return text.code if isinstance(text, Note) else ""
+
+
 # ---- rendering -----------------------------------------------------------------------------------------------------
 
 
@@ -158,15 +182,15 @@ def rendered_for(text: str, reader: Reader) -> str:
 
 
 def rendered(texts: Iterable[str]) -> tuple[str, ...]:
-    """Return messages written for the surface of this process."""
-    return tuple(render(text) for text in texts)
+    """Return messages written for the surface of this process, with the codes that they have."""
+    return tuple(Note(render(t), t.code) if isinstance(t, Note) else render(t) for t in texts)
 
 
 Write = Callable[[Sequence[str], Reader], str]
 
 FLAGS = {
     "start": "from", "end": "to", "frozen": "freeze", "values": "set", "folder": "out", "beside": "with",
-    "position_map": "position", "without_watchdog": "no-watchdog",
+    "position_map": "position", "torque_channel": "torque", "without_watchdog": "no-watchdog",
 }  # fmt: skip
 """Arguments whose option has another name."""
 

@@ -55,7 +55,7 @@ from stickslip.identify.fit.uncertainty import verdict_on
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_columns, name_option
+from stickslip.messages import Note, name_columns, name_option
 from stickslip.model import Model
 from stickslip.spec import Law
 
@@ -455,9 +455,7 @@ def finished(
     fit = details.get("slow_motion")
     combined = fit.combinations() if isinstance(fit, LawFit) else list[str]()
     last = (
-        [
-            f"Not identified: {', '.join(untold)}; other values of {'it' if len(untold) == 1 else 'them'} fit as well."
-        ]
+        [Note(f"Not identified: {', '.join(untold)}; other values fit equally well.", "not-identified")]
         if untold
         else []
     )

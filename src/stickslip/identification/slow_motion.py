@@ -379,7 +379,7 @@ def compliant_refused(
         )
     else:
         return list(estimates)
-    why = f"only reversals determine it, {why}; record slow reversals with a sensor at the load"
+    why = f"determined by reversals only, {why}; record slow reversals with a sensor at the load"
     return [
         replace(e, identified=False, verdict=why, cause=cause)
         if e.identified and of_presliding(law, p, e.name, sliding.speeds) else e for e in estimates

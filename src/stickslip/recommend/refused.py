@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.rigid import RigidAxis
-from stickslip.messages import name_option
+from stickslip.messages import code_of, name_option
 from stickslip.recommend.candidate_run import AT_REST, IN_MOTION, LARGER, LEFT, ROUGH_MOTION
 from stickslip.recommend.candidates import AFTER_A_PUSH, WORTH, Bench, Candidate, Setting
 from stickslip.recommend.long_rest import HUNTS
@@ -93,7 +93,7 @@ def on_every_axis(
 
 def remedy_of(reason: str) -> str:
     """Return what to do about a reason."""
-    return next((remedy for start, remedy in REMEDIES.items() if start in reason), NOT_FRICTION)
+    return REMEDIES.get(code_of(reason) or reason, NOT_FRICTION)
 
 
 def _bad(error: float, unsafe: Sequence[str]) -> bool:

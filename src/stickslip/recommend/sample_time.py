@@ -18,7 +18,7 @@ from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.drivetrain import Drivetrain
 from stickslip.machines.machine import Machine
-from stickslip.messages import name_option
+from stickslip.messages import Note, name_option
 from stickslip.recommend.candidate_run import Drive
 
 WELL_DAMPED = 2.0
@@ -26,7 +26,8 @@ WELL_DAMPED = 2.0
 MIDDLE = 10.0
 """Hz; a linear loop is the same at every frequency."""
 
-ROWS = "the time between the rows of"
+ROWS = "rows"
+"""Code of the sample time that is the time between the rows of a record."""
 OWN = f"where the drive's is another one, give {name_option('sample_time')}"
 
 
@@ -68,7 +69,7 @@ def sample_time_for(
             f"assumed: sampled every {period:.3g} s, as {record} has rows, this loop would be unstable or hardly "
             f"damped, so that it is taken to run faster than the record was kept; {OWN}"
         )
-    return period, f"{ROWS} {record}; {OWN}"
+    return period, Note(f"the time between the rows of {record}; {OWN}", ROWS)
 
 
 def below_half_the_rate(corner: float, period: float) -> bool:

@@ -6,7 +6,6 @@ The head of the report and what `stickslip identify` prints are made of these se
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identification.notes import CONTRADICTED, drift_of, on_timing
+from stickslip.identification.notes import CONTRADICTED, TIMING_CONTRADICTED, drift_of, on_timing
 from stickslip.identification.sliding import SlidingPosterior
 from stickslip.identify.axis.loop_check import OTHER_LOOP
 from stickslip.identify.axis.problem import mechanics_parameters
@@ -24,7 +23,7 @@ from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.identify.motion import speeds_of
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_option, render, rendered
+from stickslip.messages import code_of, name_option, render, rendered
 from stickslip.record import Record
 from stickslip.report.next_steps import Step, next_steps
 from stickslip.report.plots import quantity
@@ -41,8 +40,6 @@ AMPLITUDE = 0.02
 """Part of friction's level that a torque over the position must be for it to be told. What the form of a law leaves
 repeats with the motion, and so over the position: of 43 orders that no machine had, found beside whole turns in 144
 logs with cogging (`benchmarks/ordinary_logs.py`), 39 were smaller, and none of 256 that were there."""
-OF_ONE = re.compile(r"\b(determines?|distinguish) it\b")
-"""How a verdict speaks of its number."""
 OWN_WORDS = {
     "fc": "Coulomb torque", "fs": "static (break-away) torque", "fs_positive": "break-away torque, v > 0",
     "stiffness": "stiffness at rest", "fs_negative": "break-away torque, v < 0",
@@ -105,7 +102,7 @@ def answers_of(
     """
     sliding = sliding_of(found)
     timing = [s for s in timing_of(found) if s in found.notes]
-    missing = tuple(s for s in found.notes if s.startswith("Not identified: "))
+    missing = tuple(s for s in found.notes if code_of(s) == "not-identified")
     reasons = tuple(doubts(found, sliding))
     return Answers(
         tuple(friction_in(found, records)), trusted(found, reasons), (*evidence(found, sliding), *timing),
@@ -186,14 +183,9 @@ def one_number_each(estimates: Iterable[Estimate]) -> list[str]:
         if not e.identified:
             reasons.setdefault(e.verdict, []).append(e.name)
     return [
-        f"{', '.join(names)} not identified: {of_several(why, names)}"
-        for why, names in ((why or "the data do not determine it", names) for why, names in reasons.items())
+        f"{', '.join(names)} not identified: {why or 'not determined by the data'}"
+        for why, names in reasons.items()
     ]
-
-
-def of_several(why: str, names: Sequence[str]) -> str:
-    """A verdict on one number, said of all of these."""
-    return why if len(names) == 1 else OF_ONE.sub(r"\1 them", why)
 
 
 # ---- can I trust it -------------------------------------------------------------------------------------------------
@@ -248,10 +240,11 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
     held, own = (found.misfit.get(f"{p}force_relative", math.nan) for p in ("held_out_", ""))
     if held > ELSEWHERE * own:
         out.append(f"on records held out its force error is {percent(held)}, {percent(own)} on those fitted")
-    if any(OTHER_LOOP in note for note in found.notes):
+    known = {code_of(note) for note in found.notes}
+    if OTHER_LOOP in known:
         out.append("the record shows another controller than the loop given")
-    if any(note.startswith(CONTRADICTED) for note in found.notes):
-        out.append(f"{CONTRADICTED[0].lower()}{CONTRADICTED[1:]}")
+    if TIMING_CONTRADICTED in known:
+        out.append(f"the {CONTRADICTED}")
     warned = [f for f in found.findings if getattr(f, "level", "") == "warning"]
     posterior = found.details.get("sliding")
     if isinstance(posterior, SlidingPosterior) and not any(f.code == "change" for f in warned):

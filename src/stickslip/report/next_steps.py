@@ -58,7 +58,7 @@ def weighed(found: Identification, files: Sequence[str], model_file: str) -> lis
     axis = found.details.get("axis")
     if not isinstance(axis, ServoAxis) or axis.gravity == "pendulum" or found.method == "cogging":
         return []
-    told = any(f.code == "gravity" and "--pendulum" in f.remedy for f in found.findings)
+    told = any(f.code == "gravity" for f in found.findings)
     sliding = found.details.get("sliding")
     if not told and isinstance(sliding, SlidingPosterior) and axis.motion != "linear":
         told = any(abs(order - 1.0) < 1e-3 and x > HEAVY * sliding.friction for order, x in sliding.waves)

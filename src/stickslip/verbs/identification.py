@@ -327,7 +327,5 @@ def _given(h: Held) -> tuple[str, ...]:
 
 def _cells(e: Estimate) -> tuple[str, ...]:
     value = "not determined" if e.undetermined or math.isnan(e.value) else f"{e.value:.5g}"
-    verdict = (
-        "identified" if e.identified else f"not identified: {e.verdict or 'the data do not determine it'}"
-    )
+    verdict = "identified" if e.identified else f"not identified: {e.verdict or 'not determined by the data'}"
     return e.name, value, interval_text(e), e.unit, verdict

@@ -248,7 +248,7 @@ def verdict_on(p: Parameter, value: float, low: float, high: float, noise: Noise
         return "the data set no limit to it"
     if p.nonnegative:
         if low <= NOTHING * high:
-            return "the data do not distinguish it from 0"
+            return "cannot be distinguished from 0"
         if high > RATIO * low:
             return f"the interval spans a factor of {high / low:.3g}; identified means at most {RATIO:g}"
         return ""

@@ -99,7 +99,7 @@ class Options:
             )
 
 
-ARGUMENTS = {"laws": "law", "held_out": "hold_out"}
+ARGUMENTS = {"laws": "law", "held_out": "hold_out", "torque": "torque_channel"}
 """Arguments that have another name than the field of `Options`."""
 OF_EVERY_METHOD = ("torque_constant", "force_constant", "model_offset", "estimate", "progress")
 """Fields that no method refuses: how a log is read, and how it is computed."""

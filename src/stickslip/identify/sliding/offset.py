@@ -48,7 +48,7 @@ def apart_from_friction(found: Fit, points: SlidingPoints) -> Fit:
     """
     if not points.one_way:
         return found
-    why = f"one direction does not distinguish it from Coulomb friction; {BOTH}"
+    why = f"cannot be distinguished from Coulomb friction in one direction; {BOTH}"
     judged = [replace(e, identified=False, verdict=why) if e.name == "offset" else e for e in found.estimates]
     return replace(found, estimates=tuple(judged))
 
