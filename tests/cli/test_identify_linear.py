@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stickslip.identify.on_a_line import worded, words
 
 from stickslip.cli import main
 from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.identified_file import read_identified
-from stickslip.identify.on_a_line import worded, words
 from stickslip.machines.servo import ServoAxis
 
 ANGULAR = re.compile(r"N·m|(?<![a-z])m?rad(?![a-z])|kg·m²")

@@ -69,7 +69,7 @@ def test_a_tracking_record_is_no_break_away_record() -> None:
     found = identify_breakaway(record)
     assert not any(e.identified for e in found.estimates)
     (said,) = (note for note in found.notes if "is it the record of a motion?" in note)
-    assert "--method axis" in said
+    assert 'method="axis"' in said
     # Ramps beside it: what is no ramp is said.
     few = Record(time[:4000], {k: v[:4000] for k, v in channels.items()}, record.units)
     found = identify_breakaway([ramps([0.1] * 36, np.random.default_rng(0)), few])

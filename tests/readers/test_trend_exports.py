@@ -56,8 +56,8 @@ def test_whole_seconds_beside_a_column_of_three_digits_stay_apart(tmp_path):
 
 
 def test_a_column_of_words_is_there_and_cannot_be_read(tmp_path):
-    with pytest.raises(InputError, match=r"map=..time.: .date..: column 'Date' holds neither numbers nor a clock that can "
-                                         r"be read, first '02/12/2024'; choose from Time, "):  # fmt: skip
+    with pytest.raises(InputError, match=r"map=..time.: .date..: column 'Date' holds neither numbers nor a clock "
+                                         r"that can be read, first '02/12/2024'; choose from Time, "):  # fmt: skip
         read(trend(tmp_path / "trend.csv"), ["time=date"])
     (tmp_path / "log.jsonl").write_text(
         "".join(f'{{"t": {k}, "q": {k * k}, "state": "RUN"}}\n' for k in range(9))

@@ -118,7 +118,7 @@ def test_what_is_made_for_another_drive_is_refused(file):
     ):
         made_for([Controller(loop=loop, sample_time=2e-3)], DRIVE, None, FOUND.model)
     with pytest.raises(
-        InputError, match=r"encoder_counts = 4096 is not the drive's, 0; .* --counts-per-rev 4096"
+        InputError, match=r"encoder_counts = 4096 is not the drive's, 0; .* counts_per_rev=4096"
     ):
         made_for([Controller(loop=loop, sample_time=1e-3, encoder_counts=4096.0)], DRIVE, None, FOUND.model)
     with pytest.raises(InputError, match=r"nothing.toml: there is no such file; give a TOML file"):
