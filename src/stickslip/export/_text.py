@@ -101,7 +101,7 @@ def _environment() -> jinja2.Environment:
             return value
         return Code(text_in(str(context.name).removesuffix(".j2").rpartition(".")[2], value))
 
-    environment = jinja2.Environment(
+    return jinja2.Environment(
         loader=jinja2.PackageLoader("stickslip.export"),
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
@@ -109,8 +109,6 @@ def _environment() -> jinja2.Environment:
         autoescape=True,  # of what `printed` returns nothing is escaped; macros and includes stay as they are
         finalize=printed,
     )
-    environment.globals["unit"] = axis_unit
-    return environment
 
 
 def render(template: str, **values: Any) -> str:
@@ -118,7 +116,7 @@ def render(template: str, **values: Any) -> str:
     from stickslip import __version__
     from stickslip.control.composition import LARGEST
 
-    common = {"version": __version__, "largest": LARGEST}
+    common: dict[str, Any] = {"version": __version__, "largest": LARGEST, "unit": axis_unit}
     return str(_environment().get_template(template).render({**common, **values}))
 
 
