@@ -38,6 +38,9 @@ FORM, OPTIONS = "under “Columns and units”", "under “Options”"
          'leave_out=["1:4", "7:9"]', "“Leave this part out” = 1:4, 7:9"),
         (messages.name_option("lead", "MM"), "--lead MM", "lead=METRES", f"the lead of the screw {FORM}"),
         (messages.name_option("lead", "5"), "--lead 5", "lead=0.005", f"the lead of the screw {FORM} = 5"),
+        (messages.name_options(gear_ratio="5", side="load", pendulum=True), "--gear-ratio 5 --side load --pendulum",
+         'gear_ratio=5, side="load", pendulum=True',
+         f"the gear ratio {FORM} = 5, “Measured on the side of” {FORM} = load, “Gravity of a pendulum” {OPTIONS}"),
         (messages.name_columns(torque="COLUMN:Nm"), "--map torque=COLUMN:Nm", 'map={"torque": "COLUMN:Nm"}',
          f"“torque” = its column in Nm {FORM}"),
         (messages.name_columns(sensor_torque="F [uN]:-uN"), "--map 'sensor_torque=F [uN]:-uN'",
@@ -245,9 +248,9 @@ def test_every_option_of_a_message_exists() -> None:
     alone = {"force", "confirm", "without_watchdog"}
     for text, place in REFERENCES:
         kind, *parts = text.strip(messages.START + messages.END).split(messages.SEPARATOR)
-        if kind == "option":
-            assert messages.flag(parts[0]) in options, place
-            assert parts[0] in arguments | alone, place
+        for name in {"option": parts[:1], "options": parts[::2]}.get(kind, []):
+            assert messages.flag(name) in options, place
+            assert name in arguments | alone, place
 
 
 def strings(tree: ast.Module) -> Iterator[tuple[int, str]]:

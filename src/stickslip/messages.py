@@ -80,6 +80,11 @@ def name_option(name: str, *values: object) -> str:
     return _reference("option", name, *values)
 
 
+def name_options(**values: object) -> str:
+    """Refer to several options that are given together, each with its value."""
+    return _reference("options", *(part for pair in values.items() for part in pair))
+
+
 def name_columns(**mapping: str) -> str:
     """Refer to the mapping of channels to columns, such as ``torque="COLUMN:UNIT"``."""
     return _reference("columns", *(part for pair in mapping.items() for part in pair))
@@ -157,7 +162,7 @@ def code_of(text: str) -> str:
 
 
 def render(text: str, *, arrays: bool = False, motion: bool = False) -> str:
-    """Return a message with its references written for the surface of this process (`shown_on`).
+    """Return a message with its references written for the surface of this process (`shown_on`); a note stays a note.
 
     Parameters
     ----------
@@ -165,7 +170,8 @@ def render(text: str, *, arrays: bool = False, motion: bool = False) -> str:
     arrays, motion : bool
         As of `Reader`.
     """
-    return rendered_for(text, Reader(_surface, arrays, motion))
+    written = rendered_for(text, Reader(_surface, arrays, motion))
+    return Note(written, text.code) if isinstance(text, Note) else written
 
 
 def rendered_for(text: str, reader: Reader) -> str:
@@ -182,8 +188,8 @@ def rendered_for(text: str, reader: Reader) -> str:
 
 
 def rendered(texts: Iterable[str]) -> tuple[str, ...]:
-    """Return messages written for the surface of this process, with the codes that they have."""
-    return tuple(Note(render(t), t.code) if isinstance(t, Note) else render(t) for t in texts)
+    """Return messages written for the surface of this process."""
+    return tuple(render(text) for text in texts)
 
 
 Write = Callable[[Sequence[str], Reader], str]
@@ -217,6 +223,7 @@ def _quoted(text: str) -> str:
 
 COMMAND_LINE: dict[str, Write] = {
     "option": _command_line_option,
+    "options": lambda parts, reader: " ".join(_command_line_option(pair, reader) for pair in _pairs(parts)),
     "columns": _command_line_columns,
     "parameter": lambda parts, _: f"--set {parts[0]}={parts[1]}",
     "setting": lambda parts, _: f"--set {parts[0]}" + (f"={parts[1]}" if parts[1] else ""),
@@ -271,6 +278,7 @@ def _python_loop(parts: Sequence[str], _reader: Reader) -> str:
 
 PYTHON: dict[str, Write] = {
     "option": _python_option,
+    "options": lambda parts, reader: ", ".join(_python_option(pair, reader) for pair in _pairs(parts)),
     "columns": _python_columns,
     "parameter": lambda parts, _: f'values={{"{parts[0]}": {parts[1]}}}',
     "setting": lambda parts, _: f'settings={{"{parts[0]}": {_python_value(parts[1] or "..")}}}',
@@ -330,6 +338,7 @@ def _page_columns(parts: Sequence[str], _reader: Reader) -> str:
 
 PAGE: dict[str, Write] = {
     "option": _page_option,
+    "options": lambda parts, reader: ", ".join(_page_option(pair, reader) for pair in _pairs(parts)),
     "columns": _page_columns,
     "parameter": lambda parts, _: f"the value of {parts[0]}" + _given(parts[1]),
     "setting": lambda parts, _: (

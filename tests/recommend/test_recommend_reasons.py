@@ -49,6 +49,7 @@ def test_the_sample_time_is_the_records_where_nothing_else_is_given_and_it_is_sa
         "Simulated with a sample time of 0.0005 s, the time between the rows of the record log.csv;"
     )
     assert "give sample_time." in render(said)
+    assert drive.as_dict()["sample_time_from"].endswith("give sample_time")
     period, source = sample_time_for(identified(), None, None, drive_of)
     assert period == pytest.approx(1e-3)
     assert source.startswith("assumed, as the model does not contain")

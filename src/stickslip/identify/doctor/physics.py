@@ -18,7 +18,7 @@ from stickslip.finding import Finding
 from stickslip.identify.doctor.view import NEVER, Array, Smooth, View
 from stickslip.identify.fit.shifts import least_between, shifts_looked_at
 from stickslip.identify.fit.uncertainty import RATIO
-from stickslip.messages import name_option
+from stickslip.messages import name_option, name_options
 from stickslip.readers.convert import pendulum_before_gear
 
 ROWS = 20_000
@@ -336,7 +336,7 @@ def _degrees_or_gear(view: View, smooth: Smooth) -> Finding:
     fine: Array = np.linspace(best / 1.04, 1.04 * best, 41)
     rests = [_fit(smooth, 0, periodic=True, turn=n * math.tau).rest for n in fine]
     best, least = float(fine[int(np.argmin(rests))]), min(rests)
-    seen = f"{name_option('gear_ratio', f'{best:.3g}')} {name_option('side', 'load')} {name_option('pendulum', True)}"
+    seen = name_options(gear_ratio=f"{best:.3g}", side="load", pendulum=True)
     other = not 1.0 / APART < best / IN_DEGREES < APART
     if other and least < CLOSER * _fit(smooth, 0, periodic=True, turn=360.0).rest:
         turns = f"{best * math.tau:.4g} rad, {best:.3g} turns"
