@@ -78,7 +78,7 @@ def test_a_cascade_is_refused_for_its_reference_velocity_and_not_for_what_the_re
     )
     assert found
     assert found[1] == found[2] == found[3]
-    assert "--reference-velocity difference" in advice.why_none
+    assert 'reference_velocity="difference"' in advice.why_none
     assert not any("determine" in note for note in advice.notes)
     with pytest.raises(InputError, match=r"^no compensator is recommended: the closest candidate"):
         _ = RecommendationResult(advice, stribeck(vs_known)).model

@@ -88,7 +88,7 @@ def identify_attraction(loop: Loop, template: Model, *, noise: Noise | float | N
         "Lag of friction in sliding",
         said,
         f"velocity ({axis_unit('rad/s')})",
-        f"friction torque ({loop.unit[1]})",
+        f"friction torque ({axis_unit(loop.unit[1])})",
         traces,
     )
     return Identification(

@@ -253,7 +253,7 @@ def _open_notes(unknown: Sequence[str], untouched: Sequence[str]) -> list[str]:
 def _measure_next(points: SlidingPoints, found: Fit, settling: float | None) -> tuple[str, ...]:
     """What would tell more."""
     if settling is not None:
-        return (f"Measure the torque at a constant velocity of {settling:.3g} {points.unit[0]}.",)
+        return (f"Measure the torque at a constant velocity of {settling:.3g} {axis_unit(points.unit[0])}.",)
     return () if found.noise.known else ("Repeat some velocities, so that the noise level is known.",)
 
 
