@@ -63,6 +63,12 @@ def test_each_reader_gets_own_words(message: str, command_line: str, python: str
     assert shown == [f"say {words}, or" for words in (command_line, python, page)]
 
 
+@pytest.mark.parametrize("text", ["option", "columns\ufdd1a", "other\ufdd1a", ""])
+@pytest.mark.parametrize("surface", Surface)
+def test_what_imitates_a_reference_stays(text: str, surface: Surface) -> None:
+    assert rendered_for(f"column \ufdd0{text}\ufdd2", Reader(surface)) == f"column \ufdd0{text}\ufdd2"
+
+
 def test_arrays_have_units_and_no_columns() -> None:
     arrays = Reader(Surface.PYTHON, arrays=True)
     assert (

@@ -182,7 +182,10 @@ def rendered_for(text: str, reader: Reader) -> str:
 
     def written(found: re.Match[str]) -> str:
         kind, *parts = found[1].split(SEPARATOR)
-        return write[kind](parts, reader) if kind in write else found[0]
+        try:
+            return write[kind](parts, reader)
+        except (KeyError, IndexError, ValueError):  # a text of a user that imitates a reference
+            return found[0]
 
     return REFERENCE.sub(written, text)
 
