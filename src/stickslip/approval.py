@@ -23,6 +23,7 @@ from pathlib import Path
 
 from stickslip.arguments import arguments_checked
 from stickslip.errors import CodeRefused, InputError, UnusedPlace, unwritable
+from stickslip.messages import ask_for_code
 from stickslip.ownership import exposure_of
 
 _allowed: ContextVar[bool] = ContextVar("stickslip_code_allowed", default=False)
@@ -114,7 +115,7 @@ def demand(path: str, code: bytes, named_by: str) -> None:
     if not _allowed.get():
         raise CodeRefused(
             f"{named_by} would run the Python code of {path}, which is not approved on this computer; read it, then "
-            "give --allow-code (in Python: `with stickslip.allow_code():`)",
+            f"{ask_for_code()}",
             path, code,
         )  # fmt: skip
     _note(path, digest)

@@ -16,7 +16,7 @@ from itertools import chain, repeat
 from typing import Any, ParamSpec, TypeVar, cast
 
 from stickslip.errors import BEYOND, InputError, ParameterError, StickslipError, UnknownName, beyond, one_line
-from stickslip.in_python import SIGNALS, in_python
+from stickslip.messages import SIGNALS, render
 from stickslip.rules import Rule, Wrong, rule_of
 
 EXAMPLES = {
@@ -181,7 +181,7 @@ def unknown_argument(owner: str, name: str, names: Sequence[str]) -> UnknownName
 
 
 def arguments_checked(function: Callable[P, R], module: str = "") -> Callable[P, R]:
-    """A function that refuses what its annotations do not allow; its errors speak of arguments, not of options.
+    """A function that refuses what its annotations do not allow.
 
     Where a whole number is annotated, 2.0 becomes 2. `module` has the names of the annotations; the function's own, if
     none is given.
@@ -224,13 +224,13 @@ def arguments_checked(function: Callable[P, R], module: str = "") -> Callable[P,
             refuse_call(owner, takes.listed, signature, args, kwargs)
             raise
         except StickslipError as error:
-            words = one_line(in_python(str(error), owner, not takes.signals.isdisjoint(kwargs)))
+            words = one_line(render(error.message, arrays=not takes.signals.isdisjoint(kwargs)))
             error.args = (words, *error.args[1:])
             raise
         except BEYOND as error:
             if isinstance(error, OSError) and error.filename is None:
                 raise  # of a device or a pipe of the caller's, not of a path that was given
-            raise InputError(in_python(f"{owner}: {beyond(error)}", owner)) from error
+            raise InputError(f"{owner}: {beyond(error)}") from error
 
     return checked
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Self, cast
 
 from stickslip.errors import ConfigError, InputError, ModelRemark, refuse_nul, suggestion
+from stickslip.messages import name_file
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 SHOWN = 5
@@ -155,7 +156,8 @@ class Table:
     def label(self, key: str = "") -> str:
         """File and dotted key, as messages begin."""
         keys = [k if BARE_KEY.fullmatch(k) else _show(k) for k in (*self.path, *([key] if key else []))]
-        return f"{self.document.name}: {'.'.join(keys)}" if keys else self.document.name
+        name = name_file(self.document.name)
+        return f"{name}: {'.'.join(keys)}" if keys else name
 
     def error(self, key: str, complaint: str) -> ConfigError:
         """The error that says ``file: path.key = value complaint``."""
@@ -366,7 +368,7 @@ def named_values(
     ----------
     pairs : iterable of str
     option : str
-        Its name, "--set", for messages.
+        A reference to it, for messages.
     value : str
         What stands for the value in its help.
     nameless : bool

@@ -36,6 +36,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stickslip.messages import ask_for_place, render
+
 if TYPE_CHECKING:
     from stickslip.record import Record
 
@@ -66,7 +68,18 @@ __all__ = [
 
 
 class StickslipError(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base of every error this package raises on purpose.
+
+    Its text is written for who reads it (`stickslip.messages`): on the command line, in Python or in the page.
+    """
+
+    @property
+    def message(self) -> str:
+        """The message as data, its references not yet written, to be part of another message."""
+        return str(self.args[0]) if self.args else ""
+
+    def __str__(self) -> str:
+        return render(self.message)
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]:
         # Constructors of some take more than the message: a pool of processes could not hand these back, and hang.
@@ -97,6 +110,9 @@ class UnknownName(InputError):
 
 class ModelRemark(UserWarning):
     """A model that runs as it is, but is seldom what was meant."""
+
+    def __str__(self) -> str:
+        return render(super().__str__())
 
 
 class UnusedPlace(UserWarning):
@@ -230,12 +246,12 @@ def suggestion(
     return otherwise or (f"choose from {', '.join(names)}" if names else "none is registered")
 
 
-def unwritable(path: Path, error: OSError, option: str = "--out") -> InputError:
-    """Return the error that states that a path cannot be written, and why; `option` chooses another place."""
+def unwritable(path: Path, error: OSError, option: str = "folder") -> InputError:
+    """Return the error that states that a path cannot be written, and why; `option` gives another."""
     why = error.strerror or str(error)
     if isinstance(error, FileExistsError | NotADirectoryError):
         why = "a file is where a folder is needed"
-    return InputError(f"cannot write {shown_path(path)} ({why}); choose another place with {option}")
+    return InputError(f"cannot write {shown_path(path)} ({why}); {ask_for_place(option)}")
 
 
 def refuse_nul(path: Path, remedy: str) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
+
+from stickslip.messages import render
 
 Level = Literal["error", "warning", "note"]
 
@@ -34,6 +36,12 @@ class Finding:
     message: str
     where: str = ""
     remedy: str = ""
+
+    def rendered(self, arrays: bool = False) -> Finding:
+        """Return the finding written for its reader; `arrays`: of signals that were given as arrays."""
+        return replace(
+            self, message=render(self.message, arrays=arrays), remedy=render(self.remedy, arrays=arrays)
+        )
 
     def line(self) -> str:
         """The finding in one line, without its level."""

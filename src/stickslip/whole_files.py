@@ -20,7 +20,7 @@ DRAFTS = ".stickslip-*.part"
 
 
 @contextmanager
-def draft_of(target: Path, option: str = "--out") -> Generator[Path]:
+def draft_of(target: Path, option: str = "folder") -> Generator[Path]:
     """Yield an empty draft in the folder of `target`; it replaces `target` at the end, or is removed after an error.
 
     A symbolic link stays one: the file that it points to is replaced.
@@ -60,7 +60,7 @@ def draft_of(target: Path, option: str = "--out") -> Generator[Path]:
         raise unwritable(target, error, option) from None
 
 
-def write_whole(target: Path, content: str | bytes, option: str = "--out") -> Path:
+def write_whole(target: Path, content: str | bytes, option: str = "folder") -> Path:
     """Write text (UTF-8, line ends as they are) or bytes to a file, as `draft_of` does; return `target`.
 
     Raises
@@ -71,7 +71,7 @@ def write_whole(target: Path, content: str | bytes, option: str = "--out") -> Pa
     return target
 
 
-def write_together(contents: Mapping[Path, str | bytes], option: str = "--out") -> None:
+def write_together(contents: Mapping[Path, str | bytes], option: str = "folder") -> None:
     """Write several files as `write_whole` does: all of them or, if one cannot be written, none.
 
     Raises
@@ -94,7 +94,7 @@ def _encoded(text: str, target: Path) -> bytes:
         ) from None
 
 
-def prepared_folder(folder: Path, option: str = "--out") -> Path:
+def prepared_folder(folder: Path, option: str = "folder") -> Path:
     """Make the folder and check that files can be made in it, before anything is computed; return it.
 
     Raises

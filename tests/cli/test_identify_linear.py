@@ -11,10 +11,7 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.identify.estimate import Estimate, Identification
 from stickslip.identify.identified_file import read_identified
-from stickslip.identify.on_a_line import worded, words
-from stickslip.machines.servo import ServoAxis
 
 ANGULAR = re.compile(r"N·m|(?<![a-z])m?rad(?![a-z])|kg·m²")
 
@@ -53,20 +50,6 @@ def test_sliding_says_newtons_everywhere(
     assert read_identified(tmp_path / "model.toml").motion == "linear"
 
 
-def test_verdicts_of_the_axis_are_in_newtons() -> None:
-    """ "the torque asks for -158 N·m" stood beside a table in N."""
-    rotary = Estimate(
-        "fc", "N·m", "F_C", 1.0, 0.1, 0.0, 2.0, False, "the torque asks for -158 N·m (-1.36 at most)"
-    )
-    details = {"axis": ServoAxis(drive_side="load", motion="linear")}
-    found = Identification(
-        "axis", None, (rotary,), np.eye(1), {}, ("fc: 0.7429 N·m against 3 N·m·s/rad",), details=details
-    )
-    said = worded(found)
-    assert said.estimates[0].verdict == "the torque asks for -158 N (-1.36 at most)"
-    assert said.notes == ("fc: 0.7429 N against 3 N·s/m",)
-
-
 def test_the_axis_of_a_linear_record_says_newtons(
     staircase: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -91,16 +74,3 @@ def test_misfits_in_json_are_named_by_their_unit(
     found = json.loads(capsys.readouterr().out)
     assert found["misfit"]["rms_N"] < 0.01
     assert "rms_Nm" not in found["misfit"]
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("0.5 N·m at 2 rad/s", "0.5 N at 2 m/s"),
-        ("torque (mN·m), (N·m·s/rad)", "torque (mN), (N·s/m)"),
-        ("3 mrad, 2 kg·m²", "3 mm, 2 kg"),
-        ("a gradient of a bradawl", "a gradient of a bradawl"),
-    ],
-)
-def test_units_in_words(text: str, expected: str) -> None:
-    assert words(text) == expected

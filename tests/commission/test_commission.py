@@ -300,11 +300,13 @@ def test_a_folder_with_results_or_another_rigs_records_is_refused(tmp_path):
         Track(duration=0.2, bandwidth=8.0), name="track-100-alone"
     )
     claim(rig)
-    with pytest.raises(InputError, match=r"alone\.npz is a record of 'virtual other'.*thesis-dry.*--force"):
+    with pytest.raises(
+        InputError, match=r"alone\.npz is a record of 'virtual other'.*thesis-dry.*force to measure"
+    ):
         claim(virtual_rig("thesis-dry"))
     (tmp_path / "model.toml").write_text("")
     written([tmp_path / "model.toml"])
-    with pytest.raises(InputError, match=r"holds model\.toml already; give another folder with --out"):
+    with pytest.raises(InputError, match=r"holds model\.toml already; give another folder \(folder\)"):
         claim(rig)
     claim(rig, anew=True)
     assert not (tmp_path / "model.toml").exists()

@@ -134,8 +134,8 @@ def test_a_loops_description_has_it() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: loop_of("kp=1,reference_velocity=diff"), "reference_velocity of --loop.*diff"),
-        (lambda: loop_of("kp=1,reference_velocity="), "--loop 'reference_velocity=' must be NAME=VALUE"),
+        (lambda: loop_of("kp=1,reference_velocity=diff"), "reference_velocity of loop.*diff"),
+        (lambda: loop_of("kp=1,reference_velocity="), "loop 'reference_velocity=' must be NAME=VALUE"),
         (
             lambda: loop_of("kp=1,reference_velocity=instant,reference_velocity=difference"),
             "gives both instant and difference; give reference_velocity once",

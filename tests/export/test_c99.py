@@ -263,7 +263,7 @@ def test_a_controller_in_continuous_time_is_refused():
 
 
 def test_a_name_that_is_no_identifier_is_refused():
-    with pytest.raises(InputError, match="--name"):
+    with pytest.raises(InputError, match=r"\(name\)"):
         Job(example(LAWS[0]), "my law")
 
 

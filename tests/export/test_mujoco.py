@@ -65,7 +65,7 @@ def test_what_is_no_model_is_refused(text):
 
 def test_another_shape_factor_is_refused_and_offered_as_the_nearest():
     model = Model("lugre", **{**LUGRE, "delta_s": 1.0})
-    with pytest.raises(CannotCarry, match=r"shape of its sliding curve.*--nearest"):
+    with pytest.raises(CannotCarry, match=r"shape of its sliding curve.*nearest=True"):
         write(job(model))
     found = read(write(job(model, nearest=True)).files["axis.xml"]).parameters
     assert (found.sigma0, found.sigma1) == (LUGRE["sigma0"], LUGRE["sigma1"])

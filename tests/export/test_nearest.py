@@ -91,7 +91,7 @@ def test_a_refusal_says_what_is_lost_and_how_near_one_comes():
         "x",
     )
     with pytest.raises(
-        CannotCarry, match=r"non-local memory.*nearest is fc = .* N·m .*rms.*--nearest"
+        CannotCarry, match=r"non-local memory.*nearest is fc = .* N·m .*rms.*nearest=True"
     ) as refused:
         carried(job, "urdf", [COULOMB])
     assert "\n" not in str(refused.value)

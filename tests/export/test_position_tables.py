@@ -91,7 +91,7 @@ def test_what_is_refused():
         c_table(MAP, "my map")
     with pytest.raises(InputError, match="the VESC adds a current"):
         vesc(MAP.scaled(0.03, "N·m"))
-    with pytest.raises(InputError, match="is a table; take --to c99"):
+    with pytest.raises(InputError, match=r"is a table; take to=.c99."):
         written(replace(MAP, table=(0.0, 0.1)), map_target("st"), "cogging")
     with pytest.raises(InputError, match="is no name in most languages"):
         written(MAP, map_target("st"), "2nd")
@@ -194,7 +194,7 @@ def test_every_target_refuses_what_is_no_map(name):
         written(PositionMap(MAP.even, unit=unit, lower=0.0, upper=3.0), target, "cogging")
     if target.unit:
         other = replace(MAP, unit="A" if unit == "N·m" else "N·m")
-        with pytest.raises(InputError, match=r"give --set torque_constant=VALUE"):
+        with pytest.raises(InputError, match=r"give settings=..torque_constant.: VALUE"):
             written(other, target, "cogging")
         with pytest.raises(InputError, match="greater than 0"):
             written(other, target, "cogging", {"torque_constant": "nothing"})

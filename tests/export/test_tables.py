@@ -170,7 +170,7 @@ def test_what_the_kernel_does_not_take_is_refused(values, says):
 
 
 def test_the_drives_unit_must_be_given():
-    with pytest.raises(InputError, match="--set torque_per_unit=VALUE"):
+    with pytest.raises(InputError, match=r"settings=..torque_per_unit.: VALUE"):
         beckhoff.write(Job(STRIBECK, "x"))
 
 

@@ -47,7 +47,7 @@ def test_a_law_leaves_or_is_refused_with_what_is_lost_and_the_nearest(target, la
     assert said.startswith(f"{target.name} carries ")
     assert f"{law.name} would lose" in said
     assert "off the sliding curve" in said
-    assert said.endswith("--nearest")
+    assert said.endswith("nearest=True")
     order = job(law, target, nearest=True)
     export = target.write(order)
     assert any(note.startswith("not carried: ") for note in export.notes)

@@ -148,7 +148,7 @@ def test_times_rounded_to_microseconds_are_those_of_even_samples(logs: Any) -> N
 def test_rows_too_far_apart_for_dynamics_are_refused(logs: Any, period: float) -> None:
     log = logs.draw(4101, "held", 1000, "p-pi", "production", "clean", duration=4.0)
     record = replace(experiment(log), time=period * np.arange(log.time.size))
-    with pytest.raises(InputError, match=r"--map time=COLUMN:ms.*--method sliding"):
+    with pytest.raises(InputError, match=r"map=..time.: .COLUMN:ms.*method=.sliding."):
         identify_axis([record], AXIS)
 
 

@@ -69,7 +69,7 @@ def test_a_tracking_record_is_no_break_away_record() -> None:
     found = identify_breakaway(record)
     assert not any(e.identified for e in found.estimates)
     (said,) = (note for note in found.notes if "is it the record of a motion?" in note)
-    assert "--method axis" in said
+    assert 'method="axis"' in said
     # Ramps beside it: what is no ramp is said.
     few = Record(time[:4000], {k: v[:4000] for k, v in channels.items()}, record.units)
     found = identify_breakaway([ramps([0.1] * 36, np.random.default_rng(0)), few])
@@ -99,15 +99,15 @@ def test_creep_by_counts_of_a_coarse_encoder_is_left_out_by_the_threshold_that_i
     record = Record(time, channels, {"position": "rad", "motor_torque": "N·m"})
     crept = identify_breakaway(record)
     assert crept["fs_positive"].value < 0.2
-    (said,) = (note for note in crept.notes if "--threshold" in note)
-    named = float(said.rpartition("--threshold ")[2].rstrip("."))
+    (said,) = (note for note in crept.notes if "threshold=" in note)
+    named = float(said.rpartition("threshold=")[2].rstrip("."))
     found = identify_breakaway(record, threshold=named)
     assert len(found.details["breaks"]) == 4
     exact = Record(time, {"position": position, "motor_torque": torque}, record.units)
     truth = identify_breakaway(exact, threshold=named)
     for name in ("fs_positive", "fs_negative"):
         assert found[name].value == pytest.approx(truth[name].value, abs=0.01)
-    assert not any("--threshold" in note for note in found.notes)
+    assert not any("threshold=" in note for note in found.notes)
 
 
 def test_an_axis_that_never_moves_is_one_clear_error() -> None:

@@ -52,8 +52,8 @@ def test_identify_and_recommend_read_the_same_description() -> None:
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ("kv=40,kvp=0.08,kp=1", "unknown number of --loop of a cascade 'kp'"),
-        ("kp=8,kx=1", "unknown number of --loop of a PID 'kx'"),
+        ("kv=40,kvp=0.08,kp=1", "unknown number of loop of a cascade 'kp'"),
+        ("kp=8,kx=1", "unknown number of loop of a PID 'kx'"),
         ("kvp=0.08", "give kv, greater than 0"),
         ("kv=40", "give kvp, greater than 0"),
         ("kv=40,kvp=-1", "give kvp, greater than 0"),

@@ -290,7 +290,7 @@ def test_what_is_refused():
     with pytest.raises(InputError, match="only one direction"):
         identify_cogging([one_way])
     method = method_named("cogging")
-    with pytest.raises(InputError, match="--map current"):
+    with pytest.raises(InputError, match=r"map=..current."):
         method.check([Record(record.time, {"position": record["position"]}, UNITS)], Options())
     with pytest.raises(UnknownName, match="slots"):
         method.check([record], Options(values={"slots": 12.0}))

@@ -177,9 +177,9 @@ def test_the_remedy_of_a_turned_current_works(tmp_path):
     )
     drive = Drive(torque_constant=0.05)
     (finding,) = examine(read(log, drive=drive)).errors
-    (said,) = re.findall(r"--map '(.*?)'", finding.remedy)
-    assert said == "current=I_q [A]:-A"
-    assert examine(read(log, [said], drive=drive)).errors == ()
+    (said,) = re.findall(r'map=\{"current": "(.*?)"\}', finding.remedy)
+    assert said == "I_q [A]:-A"
+    assert examine(read(log, {"current": said}, drive=drive)).errors == ()
 
 
 def test_a_slow_speed_can_be_asked_for():

@@ -74,7 +74,7 @@ def test_less_friction_and_more_inertia_from_some_time_on(kind):
     found = said(record(kind, friction=-0.3, inertia=0.6))
     percent = float(found.partition("friction changes by ")[2].partition(" ")[0])
     assert percent == pytest.approx(-30.0, abs=3.0)
-    at = float(found.partition("--to ")[2].partition(",")[0])
+    at = float(found.partition("end=")[2].partition(",")[0])
     assert at == pytest.approx(SWITCH * 30.0, abs=0.6)
     assert kind != "multisine" or "inertia changes by +6" in found or "inertia changes by +5" in found
 

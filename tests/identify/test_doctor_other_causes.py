@@ -32,7 +32,7 @@ def test_a_gear_is_not_taken_for_degrees(ratio, swing):
     assert found.code == "gravity"
     said = f"{found.message}; {found.remedy}"
     assert ":deg" not in said
-    told = float(found.remedy.split("--gear-ratio ")[1].split()[0])
+    told = float(found.remedy.split("gear_ratio=")[1].split()[0])
     assert told == pytest.approx(ratio, rel=0.05)
 
 
@@ -40,7 +40,7 @@ def test_degrees_may_be_a_gear_too():
     (found,) = [f for f in examine(swinging(360.0, 1.4)).findings if "comes back" in f.message]
     assert found.code == "position-unit"
     assert "or the motor's angle before a gear of about 5" in found.message
-    assert "if it is in degrees, or identify with --gear-ratio 5" in found.remedy
+    assert "if it is in degrees, or identify with gear_ratio=5" in found.remedy
 
 
 @pytest.mark.parametrize(("swing", "weighs"), [(0.27, True), (1.0, True), (0.27, False)])

@@ -42,7 +42,7 @@ def test_spikes_in_the_torque_are_counted_with_their_rows():
     found = codes(record(torque))
     assert "30 spikes of up to" in found["spikes"]
     assert "50 N·m" in found["spikes"]
-    assert "--leave-out spikes" in found["spikes"]
+    assert 'leave_out=["spikes"]' in found["spikes"]
     assert np.array_equal(spike_rows(record(torque)), np.sort(rows) + 1)
 
 
@@ -190,7 +190,7 @@ def test_of_a_torque_at_its_limit_throughout_no_rows_are_to_be_left_out():
     relay = np.where(np.cos(2.0 * np.pi * 1.7 * t) > 0.0, 2.2, -2.2)
     assert "saturation" not in codes(Record(t, {"position": position, "motor_torque": 0.0 * t + 0.01}, UNITS))
     found = examine(Record(t, {"position": position, "motor_torque": relay}, UNITS)).findings
-    assert not any("--leave-out" in f.remedy for f in found if f.code == "saturation")
+    assert not any("leave_out" in f.remedy for f in found if f.code == "saturation")
 
 
 @pytest.mark.parametrize(
@@ -200,19 +200,19 @@ def test_of_a_torque_at_its_limit_throughout_no_rows_are_to_be_left_out():
             1,
             6000,
             "150 rows in one stretch of rows 101:250",
-            "or leave these rows out with --leave-out 101:250",
+            'or leave these rows out with leave_out=["101:250"]',
         ),
         (
             2,
             6000,
             "300 rows in 2 stretches of rows 101:250, 501:650",
-            "--leave-out 101:250 --leave-out 501:650",
+            'leave_out=["101:250", "501:650"]',
         ),
         (
             5,
             6000,
             "750 rows in 5 stretches, first 101:250",
-            "or use the longest part without, --rows 1851:6000",
+            'or use the longest part without, rows="1851:6000"',
         ),
         (
             15,

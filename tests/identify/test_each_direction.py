@@ -140,7 +140,7 @@ def test_a_weight_is_no_friction_that_differs_by_direction(logs: Any) -> None:
     log = logs.draw(2000160, "actual", 1000, "feedforward", "staircase", "clean")
     weight = 1.6 * log.truth["fc"] - log.truth["offset"]
     record = Experiment("log", log.time, log.position, log.torque + weight)
-    with pytest.raises(InputError, match=r"larger than friction.*leave out --per-direction"):
+    with pytest.raises(InputError, match=r"larger than friction.*leave out per_direction=True"):
         identify_axis([record], ServoAxis(drive_side="load"), ["coulomb"], per_direction=True)
 
 

@@ -107,7 +107,7 @@ def test_two_windows_to_the_row_are_enough() -> None:
 
 def test_a_value_below_zero_and_an_interval_of_many_decades_are_called_what_they_are():
     assert "below 0" in verdict_on(-2.0, -1.0)
-    assert verdict_on(-2.0, 1.0) == "the data do not distinguish it from 0"
+    assert verdict_on(-2.0, 1.0) == "cannot be distinguished from 0"
     wide = Estimate("k", "N·m/rad", "k", 1.0, 1.0, 3e-12, 3e16, False, "")
     found = Identification(
         "axis", None, (wide, replace(wide, name="fs", lower=0.5, upper=2.0)), np.eye(2), {}

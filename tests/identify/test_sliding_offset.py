@@ -80,7 +80,7 @@ def test_one_direction_determines_the_sum_only(way: float) -> None:
     assert not found["offset"].identified
     assert found["sigma2"].value == pytest.approx(2e-4, abs=2e-4)
     assert f"only fc {'+' if way > 0.0 else '-'} offset" in found["fc"].verdict
-    assert "--freeze offset=0" in found["fc"].verdict
+    assert 'frozen=["offset"], values={"offset": 0}' in found["fc"].verdict
     assert found["fc"].upper == np.inf
 
 

@@ -69,7 +69,7 @@ def test_the_command_line_refuses_them_too(method: str, capsys: pytest.CaptureFi
         (["--robust"], "--inverse does not use --robust"),
         (["--free", "vs"], "--inverse does not use --free"),
         (["--law", "stribeck"], "fits law coulomb only, not stribeck"),
-        (["--set", "fc=1"], "--set fc would be ignored"),
+        (["--set", "fc=1"], "--set fc=.. would be ignored"),
         (["--inertia", "1"], "inertia cannot be held"),
     ],
 )

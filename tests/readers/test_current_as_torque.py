@@ -40,7 +40,7 @@ def test_a_profile_keeps_it_so(log, tmp_path, capsys, monkeypatch):
 
 
 def test_two_currents_and_a_voltage_are_refused(log):
-    with pytest.raises(InputError, match="is a current, and --map current=note:A names another"):
+    with pytest.raises(InputError, match=r"is a current, and map=\{\"current\": \"note:A\"\} names another"):
         read(log, ["torque=iq_A:mA", "current=note:A"])
     with pytest.raises(InputError, match="'V' is a unit of voltage; map it as voltage"):
         read(log, ["torque=iq_A:V"])

@@ -391,5 +391,5 @@ def test_a_column_s_is_not_taken_for_the_time_beside_a_t(tmp_path, header):
     path = tmp_path / "log.csv"
     row = ",".join(["{0}"] * len(header.split(",")))
     path.write_text(f"{header}\n" + "".join(row.format(0.1 * i) + "\n" for i in range(40)))
-    with pytest.raises(InputError, match=r"time may be any of .*; say which, such as --map time="):
+    with pytest.raises(InputError, match=r"time may be any of .*; say which, such as map={\"time\": "):
         read(path)

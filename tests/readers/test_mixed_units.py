@@ -11,6 +11,7 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError
+from stickslip.messages import render
 from stickslip.readers import Drive, read
 from stickslip.readers.profiles import Profile, merged
 
@@ -27,7 +28,7 @@ def written(path: Path, head: str, *columns: np.ndarray) -> Path:
 def test_a_length_beside_a_torque_asks_for_the_lead(tmp_path, capsys):
     path = written(tmp_path / "log.csv", "time [s],position [mm],motor_torque [Nm]", 1e3 * Q, TORQUE)
     with pytest.raises(
-        InputError, match=r"position 'position .mm.' in mm with motor_torque .* give --lead MM"
+        InputError, match=r"position 'position .mm.' in mm with motor_torque .* give lead=METRES"
     ):
         read(path)
     for verb in ("doctor", "identify"):
@@ -63,8 +64,8 @@ def test_the_torque_constant_of_a_screw_drive(tmp_path):
     path = written(tmp_path / "log.csv", "time [s],position [mm],current [A]", 1e3 * Q, TORQUE)
     linear = read(path, drive=Drive(torque_constant=2.0))
     assert "N/A" in linear.meta["derived"]["motor_torque"]
-    said = [f["message"] for f in linear.meta["reading"]["findings"] if f["code"] == "mixed-units"]
-    assert said == ["the axis moves along a line: --torque-constant 2 was taken in N/A"]
+    said = [render(f["message"]) for f in linear.meta["reading"]["findings"] if f["code"] == "mixed-units"]
+    assert said == ["the axis moves along a line: torque_constant=2 was taken in N/A"]
     motor = read(path, drive=Drive(force_constant=2.0))
     assert motor["motor_torque"] == pytest.approx(2.0 * TORQUE)
     assert motor.units["motor_torque"] == "N"
@@ -130,7 +131,7 @@ def test_a_linear_motors_constant_is_no_screws_and_no_turning_motors(tmp_path):
         with pytest.raises(InputError, match=r"force_constant = 3 N/A is a linear motor's.*give one of them"):
             Drive(force_constant=3.0, **beside)
     path = written(tmp_path / "log.csv", "time [s],position [deg],current [A]", Q, TORQUE)
-    with pytest.raises(InputError, match="positions are angles; give --torque-constant"):
+    with pytest.raises(InputError, match="positions are angles; give torque_constant"):
         read(path, drive=Drive(force_constant=3.0))
 
 

@@ -56,8 +56,8 @@ def test_whole_seconds_beside_a_column_of_three_digits_stay_apart(tmp_path):
 
 
 def test_a_column_of_words_is_there_and_cannot_be_read(tmp_path):
-    with pytest.raises(InputError, match=r"--map time=date: column 'Date' holds neither numbers nor a clock that can "
-                                         r"be read, first '02/12/2024'; choose from Time, "):  # fmt: skip
+    with pytest.raises(InputError, match=r"map=..time.: .date..: column 'Date' holds neither numbers nor a clock "
+                                         r"that can be read, first '02/12/2024'; choose from Time, "):  # fmt: skip
         read(trend(tmp_path / "trend.csv"), ["time=date"])
     (tmp_path / "log.jsonl").write_text(
         "".join(f'{{"t": {k}, "q": {k * k}, "state": "RUN"}}\n' for k in range(9))
@@ -73,7 +73,7 @@ def test_a_column_of_words_is_there_and_cannot_be_read(tmp_path):
 def test_a_period_that_the_header_states_is_the_remedy(tmp_path):
     path = trend(tmp_path / "trend.csv", clock=False)
     with pytest.raises(
-        InputError, match=r"give --sample-time 0\.008, as the header says \(Sampling Rate: 8 Milli-Seconds\)"
+        InputError, match=r"give sample_time=0\.008, as the header says \(Sampling Rate: 8 Milli-Seconds\)"
     ):
         read(path)
     assert read(path, sample_time=0.008).time[-1] == pytest.approx(0.008 * (N - 1))

@@ -11,6 +11,7 @@ from test_recommend_reasons import drive_of
 
 from stickslip.identify.motion import HOLD, Motion
 from stickslip.machines.rigid import RigidAxis
+from stickslip.messages import render
 from stickslip.model import Model
 from stickslip.recommend.candidate_run import Drive, Trial, run
 from stickslip.recommend.candidates import Bench, Candidate, Setting
@@ -184,7 +185,7 @@ def test_a_measured_motion_is_told_from_the_drives_reference(tmp_path: Path) -> 
     assert not list(on_motion(Drive(10.0, motion=asked), "rad"))
     (said,) = on_motion(Drive(10.0, motion=did), "rad")
     assert said.startswith("The motion is the measured position, smoothed, since its log has no reference.")
-    assert "--motion" in said
+    assert "reference with motion." in render(said)
     chosen = Candidate(Setting("coulomb", "feedforward", 0.8), (0.1, 0.1, 0.12), ())
     promised, plain = (
         reduction(Recommendation(chosen, None, {}, 1e-3, 1.5, 2.0, (), 1, drive=Drive(10.0, motion=motion)))

@@ -54,7 +54,7 @@ def test_a_unit_that_nobody_states_is_a_note(tmp_path: Path) -> None:
 
 def test_a_unit_that_is_certainly_wrong_is_refused(tmp_path: Path) -> None:
     file = log(tmp_path / "log.csv", "Time,ActPos,ActTorque", 1e3 * TIME, np.degrees(ANGLE), SLOPE)
-    with pytest.raises(InputError, match=r"1 apart .* ms rather than s; say --motion-map time=Time:ms"):
+    with pytest.raises(InputError, match=r"1 apart .* ms rather than s; say motion_map=..time.: .Time:ms"):
         motion_in(file)
     motion, notes = motion_in(file, Given(["time=Time:ms", "position=ActPos:deg"]))
     assert same(motion)
@@ -71,7 +71,7 @@ def test_few_points_may_be_seconds_apart(tmp_path: Path) -> None:
 def test_counts_are_read_by_the_encoders(tmp_path: Path) -> None:
     # A torque in percent needs a rated torque, which no motion does.
     file = log(tmp_path / "log.csv", "time_s,position_counts,torque_percent", TIME, in_counts(), 50 * SLOPE)
-    with pytest.raises(InputError, match=r"in counts; give --counts-per-rev, or --motion-map position="):
+    with pytest.raises(InputError, match=r"in counts; give counts_per_rev, or motion_map=..position"):
         motion_in(file)
     motion, notes = motion_in(file, Given(counts_per_rev=COUNTS))
     assert same(motion)
@@ -86,7 +86,7 @@ def test_counts_are_read_by_the_encoders(tmp_path: Path) -> None:
 def test_an_angle_whose_unit_is_stated_is_no_count(tmp_path: Path) -> None:
     file = log(tmp_path / "log.csv", "time_s,position_rad,torque_Nm", TIME, ANGLE, SLOPE)
     assert same(motion_in(file, Given(counts_per_rev=COUNTS))[0])
-    with pytest.raises(InputError, match=r"is in rad, and the axis moves in m; say --motion-map"):
+    with pytest.raises(InputError, match=r"is in rad, and the axis moves in m; say motion_map"):
         motion_in(file, Given(unit="m"))
 
 

@@ -114,14 +114,14 @@ def test_a_controller_runs_as_the_drive_does():
 def test_what_is_made_for_another_drive_is_refused(file):
     loop = ControlBlock("pd", None, None, kp=6.0, kd=0.1)
     with pytest.raises(
-        InputError, match=r"pd: sample_time = 0.002 s is not the drive's, 0.001 s; leave it out"
+        InputError, match=r"pd.: sample_time = 0.002 s is not the drive's, 0.001 s; leave it out"
     ):
         made_for([Controller(loop=loop, sample_time=2e-3)], DRIVE, None, FOUND.model)
     with pytest.raises(
-        InputError, match=r"encoder_counts = 4096 is not the drive's, 0; .* --counts-per-rev 4096"
+        InputError, match=r"encoder_counts = 4096 is not the drive's, 0; .* counts_per_rev=4096"
     ):
         made_for([Controller(loop=loop, sample_time=1e-3, encoder_counts=4096.0)], DRIVE, None, FOUND.model)
-    with pytest.raises(InputError, match=r"nothing.toml: there is no such file; give a TOML file"):
+    with pytest.raises(InputError, match=r"nothing.toml.: there is no such file; give a TOML file"):
         compensators_of(["nothing.toml"])
     with pytest.raises(UnknownName, match="dobs"):
         compensators_of([file, "dobs"])

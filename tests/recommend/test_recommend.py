@@ -146,7 +146,7 @@ def test_a_drive_that_cannot_move_the_axis_is_refused(monkeypatch: pytest.Monkey
         found, model=Model(found.model.law, **found.model.parameters._replace(sigma2=2.0)._asdict())
     )
     with pytest.raises(
-        InputError, match=r"torque limit 0.5 N·m: the drive cannot follow .* smaller --amplitude"
+        InputError, match=r"torque limit 0.5 N·m: the drive cannot follow .* smaller amplitude"
     ):
         recommend(viscous, Drive(20.0, amplitude=0.1, torque_limit=0.5), axes=1, confirm=2)
     monkeypatch.setattr(recommending, "GAINS", (0.5,))
@@ -384,7 +384,7 @@ def test_what_acts_beside_friction_is_on_the_axes() -> None:
 
 def test_it_is_tried_along_the_motion_of_the_log_or_asked_for_one() -> None:
     found = identified(0.02)
-    with pytest.raises(InputError, match=r"m.toml holds no motion .* --motion FILE.csv, or the --amplitude"):
+    with pytest.raises(InputError, match=r"m.toml holds no motion .* motion=.FILE.csv., or the amplitude"):
         recommend(found, Drive(20.0), axes=0, confirm=0)
     told = recommending.with_motion(replace(found, trajectory=sinusoid(0.7, 0.2)), Drive(20.0))
     assert told.path.amplitude == pytest.approx(0.7)

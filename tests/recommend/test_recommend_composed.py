@@ -176,7 +176,7 @@ def test_the_command_writes_a_controller_that_runs_and_is_exported(tmp_path, mon
 def test_what_a_controller_sets_is_refused_beside_it_in_short():
     with pytest.raises(
         ss.InputError,
-        match=r"^--sample-time cannot be combined with --controller, which sets it; leave it out$",
+        match=r"^sample_time cannot be combined with controller, which sets it; leave it out$",
     ):
         refuse_beside(Controller(loop=LOOP, sample_time=T), sample_time=T)
 

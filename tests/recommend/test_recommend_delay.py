@@ -110,7 +110,7 @@ def test_a_delay_that_looks_like_seconds_is_told(model: Path) -> None:
 def test_friction_that_grows_with_the_load_is_not_compensated_as_if_it_did_not() -> None:
     """What was recommended promised 99 % and left 82 % of the error."""
     loaded = replace(identified(), axis={**identified().axis, "load_motor": 0.5})
-    with pytest.raises(InputError, match=r"grows with the load \(load_motor\).* identify without --load"):
+    with pytest.raises(InputError, match=r"grows with the load \(load_motor\).* identify without load=True"):
         recommend(loaded, Drive(amplitude=0.2), axes=1, confirm=0)
 
 

@@ -15,13 +15,14 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.motion import sinusoid
 from stickslip.machines.rigid import RigidAxis
+from stickslip.messages import render
 from stickslip.model import Model
 from stickslip.recommend.candidate_run import Drive, run
 from stickslip.recommend.candidates import Bench, rings_alone
 from stickslip.recommend.notes import lag_of, sampled_as
 from stickslip.recommend.refusals import held
 from stickslip.recommend.ringing import within_counts
-from stickslip.recommend.sample_time import ROWS, refuse_filter, sample_time_for
+from stickslip.recommend.sample_time import refuse_filter, sample_time_for
 
 INERTIA = 4e-4
 COULOMB = Model("coulomb", fc=0.05, sigma2=1e-3)
@@ -47,7 +48,8 @@ def test_the_sample_time_is_the_records_where_nothing_else_is_given_and_it_is_sa
     assert said.startswith(
         "Simulated with a sample time of 0.0005 s, the time between the rows of the record log.csv;"
     )
-    assert "--sample-time" in said
+    assert "give sample_time." in render(said)
+    assert drive.as_dict()["sample_time_from"].endswith("give sample_time")
     period, source = sample_time_for(identified(), None, None, drive_of)
     assert period == pytest.approx(1e-3)
     assert source.startswith("assumed, as the model does not contain")
@@ -59,7 +61,9 @@ def test_a_loop_hardly_damped_at_its_records_rows_runs_faster_than_they_were_kep
 ) -> None:
     drive = drive_of(*sample_time_for(identified(period=period), None, None, drive_of, INERTIA))
     assert drive.sample_time == pytest.approx(period if kept else 1e-3)
-    assert drive.sample_time_from.startswith(ROWS if kept else f"assumed: sampled every {period:.3g} s")
+    assert drive.sample_time_from.startswith(
+        "the time between" if kept else f"assumed: sampled every {period:.3g} s"
+    )
     asked = [note for note in sampled_as(drive, None) if note.startswith("A loop that is sampled more often")]
     assert len(asked) == kept
 
@@ -79,9 +83,7 @@ def test_a_filter_that_its_records_rows_could_not_hold_runs_faster_than_they_wer
 def test_a_loop_unstable_on_an_inertia_that_is_not_identified_asks_for_the_inertia() -> None:
     unsure = Estimate("inertia", "kg·m²", "inertia", INERTIA, math.inf, 1e-6, 1e-2, False)
     drive = replace(Drive(), motion=sinusoid(0.1, 0.5))
-    with pytest.raises(
-        InputError, match=r"unstable.*--inertia in kg·m² \(Python: inertia=\), check its gains"
-    ):
+    with pytest.raises(InputError, match=r"unstable.*give that with inertia in kg·m², check its gains"):
         held(identified(unsure), "it left", drive)
     for found, given in ((identified(unsure), INERTIA), (identified(), None)):
         with pytest.raises(InputError, match="unstable: it left; check its gains"):

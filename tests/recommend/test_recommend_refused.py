@@ -14,6 +14,7 @@ from stickslip.control.linear import Cascade
 from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.identified_file import Identified
+from stickslip.messages import render
 from stickslip.model import Model
 from stickslip.recommend import recommend as recommending
 from stickslip.recommend.axes import plants_of
@@ -77,7 +78,7 @@ def test_a_cascade_is_refused_for_its_reference_velocity_and_not_for_what_the_re
     )
     assert found
     assert found[1] == found[2] == found[3]
-    assert "--reference-velocity difference" in advice.why_none
+    assert 'reference_velocity="difference"' in advice.why_none
     assert not any("determine" in note for note in advice.notes)
     with pytest.raises(InputError, match=r"^no compensator is recommended: the closest candidate"):
         _ = RecommendationResult(advice, stribeck(vs_known)).model
@@ -150,7 +151,7 @@ def test_the_error_left_names_the_attribute_that_it_depends_on() -> None:
     chosen = Candidate(Setting("coulomb", "feedforward", 0.8), errors, ())
     (said,) = by_attribute(found, chosen, plants)
     assert said.startswith("The error left depends most on reference velocity: 40 % on half")
-    assert "--reference-velocity difference" in said
+    assert 'reference_velocity="difference"' in render(said)
     alike = Candidate(chosen.setting, (0.1,) * len(plants), ())
     assert not list(by_attribute(found, alike, plants))
     assert not list(by_attribute(found, None, plants))

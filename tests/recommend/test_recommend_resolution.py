@@ -16,6 +16,7 @@ from stickslip.errors import ParameterError
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
+from stickslip.messages import render
 from stickslip.model import Model
 from stickslip.recommend import recommend as recommending
 from stickslip.recommend.recommend import Drive
@@ -45,7 +46,7 @@ def test_the_step_of_the_log_is_the_encoder_unless_one_is_given() -> None:
     counts, source = encoder_for(seen(COUNT), None)
     assert counts == 36000
     assert source.startswith("the position step of the record log0.csv (0.000175 rad)")
-    assert "--counts-per-rev" in source
+    assert "give counts_per_rev" in render(source)
     assert encoder_for(seen(COUNT), 4096.0) == (4096.0, "as given")
     assert encoder_for(seen(COUNT), 0.0) == (0.0, "as given")
     assert encoder_for(seen(COUNT), None, None, 1e6) == (1e6, "that of the controller")

@@ -19,6 +19,7 @@ from stickslip.identify.estimate import Estimate, Held, Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.needed_motions import EXPERIMENTS, MOTIONS
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import Surface, render, shown_on
 from stickslip.record import Record
 from stickslip.report.answers import answers_of, either_way, evidence, meaning_of, one_number_each
 from stickslip.report.axis_pictures import pictures_of
@@ -217,7 +218,7 @@ def test_a_model_that_misses_the_torque_is_not_called_right() -> None:
     assert said.steps[0].command.startswith("stickslip identify log.csv --inverse --out o/plain.toml  #")
     assert said.steps[1].command.startswith("stickslip recommend ")
     assert "misses" in said.trust
-    assert "plain least squares (--inverse) explains the torque better where the axis slides" in said.trust
+    assert "plain least squares (inverse=True) explains the torque better where the axis slides" in said.trust
     assert "in place of" not in said.trust  # its inertia was fitted
     assert not any("reversals alone" in line for line in said.evidence)
     # The number that makes the difference is named.
@@ -307,30 +308,27 @@ def test_python_is_told_what_to_do_next_in_python() -> None:
     out = result_lines_in_python(found, answers_of(found, [log()], "model.toml"))
     assert out[-2].startswith("next: advice = ss.recommend(found, bandwidth=10, sample_time=")
     assert out[-1] == 'next: ss.export(advice, to="c99", folder="c")'
-    shell = result_lines(found, answers_of(found, [log()], "model.toml"))[:-2]
+    with shown_on(Surface.COMMAND_LINE):
+        shell = result_lines(found, answers_of(found, [log()], "model.toml"))[:-2]
+    assert any("--per-direction" in line for line in shell)
     assert out[:-2] == [line.replace("--per-direction", "per_direction=True") for line in shell]
 
 
 def test_a_constant_torque_may_be_friction_that_differs_by_direction() -> None:
     found = identified()
     (said,) = either_way(found)
-    assert re.search(
-        r"friction that is (19|20|21)[.0-9]* % of its level greater in one direction; --per-", said
-    )
-    assert said in answers_of(found, [log()]).evidence
+    assert re.search(r"friction that is (19|20|21)[.0-9]* % of its level greater in one direction; ", said)
+    assert render(said) in answers_of(found, [log()]).evidence
     small = [dataclasses.replace(e, value=0.01 * FC) if e.name == "offset" else e for e in found.estimates]
     assert either_way(dataclasses.replace(found, estimates=tuple(small))) == []
 
 
-def test_one_number_is_spoken_of_as_one_and_several_as_several() -> None:
-    """ "Not identified: sigma2; the model's values of them are one choice among many"."""
-    why = "the data do not distinguish it from 0"
+def test_numbers_with_one_verdict_share_a_line() -> None:
+    why = "cannot be distinguished from 0"
     one = Estimate("fc", "N·m", "F_C", 0.3, 0.1, 0.0, 0.5, False, why)
     two = dataclasses.replace(one, name="sigma2")
     assert one_number_each([one]) == [f"fc not identified: {why}"]
-    assert one_number_each([one, two]) == [
-        "fc, sigma2 not identified: the data do not distinguish them from 0"
-    ]
+    assert one_number_each([one, two]) == [f"fc, sigma2 not identified: {why}"]
     assert one_number_each([dataclasses.replace(e, verdict="") for e in (one, two)]) == [
-        "fc, sigma2 not identified: the data do not determine them"
+        "fc, sigma2 not identified: not determined by the data"
     ]

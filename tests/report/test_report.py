@@ -283,7 +283,7 @@ def test_an_unwritable_folder_is_one_line(result: StudyResult, tmp_path: Path) -
     from stickslip.errors import InputError
 
     (tmp_path / "figures").write_text("in the way")
-    with pytest.raises(InputError, match="choose another place with --out"):
+    with pytest.raises(InputError, match="; choose another place"):
         report.write(replace(result, folder=tmp_path))
 
 

@@ -180,7 +180,7 @@ def test_a_drive_that_is_not_there(drive):
 
 def test_without_a_watchdog_it_does_not_arm(drive):
     rig = Ds402(drive.settings(watchdog="none"))
-    with pytest.raises(InputError, match="--no-watchdog"):
+    with pytest.raises(InputError, match="without_watchdog=True"):
         Loop(rig)
     with Loop(rig, without_watchdog=True) as loop:
         assert len(loop.run(setpoints(10))) == 10

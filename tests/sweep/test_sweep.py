@@ -149,7 +149,7 @@ def test_finished_blocks_of_another_sweep_are_not_lost(small, tmp_path):
         replace(few, runs=few.runs[::-1][:1], check=False),
     ):
         with pytest.raises(
-            InputError, match=r"holds finished blocks of another sweep .*; .*--out, or delete"
+            InputError, match=r"holds finished blocks of another sweep .*; .*choose another place, or delete"
         ):
             execute.run(other, tmp_path)
     assert table(tmp_path).equals(before)

@@ -12,6 +12,7 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.finding import Finding
+from stickslip.messages import name_option
 from support.written_log import written
 
 OPTION = re.compile(r"--[a-z]")
@@ -88,7 +89,8 @@ def test_results_name_arguments_and_no_options(
 
 
 def test_a_verdict_names_the_argument(unweighed: ss.IdentificationResult) -> None:
-    answers = replace(unweighed.answers, trust="With care: plain least squares (--inverse) explains more.")
+    said = f"With care: plain least squares ({name_option('inverse', True)}) explains more."
+    answers = replace(unweighed.answers, trust=said)
     found = replace(unweighed)
     vars(found)["answers"] = answers
     assert found.verdict == "With care: plain least squares (inverse=True) explains more."

@@ -18,6 +18,7 @@ from stickslip.control.controller import Controller
 from stickslip.errors import ParameterError
 from stickslip.friction_levels import static_level
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
+from stickslip.messages import name_option, render
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 MOST, LEAST = 100.0, 0.01
@@ -197,10 +198,10 @@ class ControllerStability:
             yield from self._poles()
         if self.linear_to < self.reach:
             least = f"up to {quantity(self.linear_to, 'rad')}" if self.linear_to > 0.0 else "in no motion"
-            yield (
+            yield render(
                 f"the controller is linear about rest only {least}; beyond that it is another loop, which these lines "
-                f"(of motion up to {quantity(self.reach, 'rad')}) do not describe: simulate it (--confirm, `stickslip "
-                "rig run track`)"
+                f"(of motion up to {quantity(self.reach, 'rad')}) do not describe: simulate it "
+                f"({name_option('confirm')}, `stickslip rig run track`)"
             )
         if self.held > 0.0 and all(loop.poles.stable for loop in self.loops):
             yield HUNTING.format(quantity(self.held, "N·m"))

@@ -12,6 +12,7 @@ import numpy as np
 
 from stickslip.analyse.controller_sample import Sample, suspects
 from stickslip.errors import InputError
+from stickslip.messages import name_command
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 SIZES = (1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
@@ -25,7 +26,7 @@ SHRINKS = 0.6
 """By which slopes for changes a tenth as large come nearer at least, where they approach the one at rest: |s|^1.25."""
 UNSURE = 0.1
 """Of the last of these ways, by which slopes at rest of both directions may differ."""
-SIMULATE = "or simulate it (`stickslip simulate`, `stickslip rig run track`)"
+SIMULATE = f"or simulate it ({name_command('simulate')}, `stickslip rig run track`)"
 
 
 def slope_at_rest(run: Sample, row: Array) -> Array:

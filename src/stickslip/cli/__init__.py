@@ -31,7 +31,7 @@ from stickslip.errors import (
     one_line,
     suggestion,
 )
-from stickslip.in_python import with_options
+from stickslip.messages import Surface, shown_on
 from stickslip.rules import LARGEST_WHOLE
 from stickslip.verbs.kinds import require
 
@@ -141,6 +141,7 @@ def real_number(text: str) -> float:
     return number
 
 
+@shown_on(Surface.COMMAND_LINE)
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line. Returns the exit code."""
     _tolerate_any_terminal()
@@ -155,8 +156,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         waiting.listen(_tell)
     given = list(sys.argv[1:] if argv is None else argv)
     try:
-        with with_options():
-            return _dispatch(given)
+        return _dispatch(given)
     except InputError as error:
         return _complain(as_given(str(error), given), 2)
     except Interrupted as error:

@@ -89,11 +89,12 @@ def read_record(path: Path, args: argparse.Namespace) -> Record:
     """
     import sys
 
+    from stickslip.messages import render
     from stickslip.verbs.reading import open_log
 
     opened = open_log(path, reading_of(args))
     for finding in opened.notes:
-        print(f"stickslip: {path}: {finding.line()}", file=sys.stderr)
+        print(f"stickslip: {path}: {render(finding.line())}", file=sys.stderr)
     return opened.record
 
 

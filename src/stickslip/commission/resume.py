@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.errors import InputError
+from stickslip.messages import name_option
 from stickslip.record import Record
 from stickslip.rigs.procedures.base import Check, Performed, Procedure
 from stickslip.rigs.rig import Rig
@@ -44,7 +45,7 @@ def claimed(folder: Path, rig: Rig, *, anew: bool, own: Callable[[Path], bool]) 
         if not own(path):
             raise InputError(
                 f"{path} was not written by a commissioning, which would overwrite it; move it, or give another folder "
-                "with --out"
+                f"({name_option('folder')})"
             )
     records = [path for name in RECORDS for path in sorted(folder.glob(f"{name}.npz"))]
     owners = {path: loaded(path).meta.get("rig", rig.name) for path in records}
@@ -52,7 +53,9 @@ def claimed(folder: Path, rig: Rig, *, anew: bool, own: Callable[[Path], bool]) 
         for path in results:
             path.unlink()
         return
-    remedy = "give another folder with --out, or --force to measure all of it again"
+    remedy = (
+        f"give another folder ({name_option('folder')}), or {name_option('force')} to measure all of it again"
+    )
     if results:
         raise InputError(f"{folder} holds {', '.join(p.name for p in results)} already; {remedy}")
     for path, owner in owners.items():
@@ -73,12 +76,12 @@ def loaded(path: Path) -> Record:
     except InputError as error:
         raise InputError(
             f"{str(error).rstrip('.')}; move it away, so that this stage is measured again, or give another folder "
-            "with --out"
+            f"({name_option('folder')})"
         ) from None
     if "settings" not in record.meta:
         raise InputError(
             f"{path} was not written by a commissioning, which would overwrite it; move it, or give another folder "
-            "with --out"
+            f"({name_option('folder')})"
         )
     return record
 

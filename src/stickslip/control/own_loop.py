@@ -12,6 +12,7 @@ from typing import Literal
 from stickslip.config import named_numbers, named_values
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import InputError, UnknownName
+from stickslip.messages import name_option
 
 ReferenceVelocity = Literal["difference", "instant"]
 """How a drive forms its reference velocity: from the last two reference positions, or the trajectory's own velocity at
@@ -43,12 +44,12 @@ def split_loop(
     InputError
         If an entry is not NAME=VALUE, or the reference velocity is neither kind.
     """
-    named = named_values(loop_text(given).split(",") if given else (), "--loop")
+    named = named_values(loop_text(given).split(",") if given else (), name_option("loop"))
     formed = named.pop(REFERENCE_VELOCITY, None)
     if formed is not None and formed not in REFERENCE_VELOCITIES:
-        raise UnknownName(f"{REFERENCE_VELOCITY} of --loop", formed, REFERENCE_VELOCITIES)
+        raise UnknownName(f"{REFERENCE_VELOCITY} of {name_option('loop')}", formed, REFERENCE_VELOCITIES)
     pairs = [f"{name}={text}" for name, text in named.items()]
-    return named_numbers(pairs, "--loop", infinite=("limit",)), formed
+    return named_numbers(pairs, name_option("loop"), infinite=("limit",)), formed
 
 
 def kind_of_loop(numbers: Mapping[str, float], beside: Sequence[str]) -> type[Gains] | type[Cascade]:
@@ -70,8 +71,10 @@ def kind_of_loop(numbers: Mapping[str, float], beside: Sequence[str]) -> type[Ga
     names = (*kind._fields, *beside)
     for name in numbers:
         if name not in names:
-            raise UnknownName(f"number of --loop of a {'cascade' if cascade else 'PID'}", name, names)
+            raise UnknownName(
+                f"number of {name_option('loop')} of a {'cascade' if cascade else 'PID'}", name, names
+            )
     for name in ("kv", "kvp") if cascade else ():
         if not numbers.get(name, 0.0) > 0.0:
-            raise InputError(f"--loop of a cascade: give {name}, greater than 0")
+            raise InputError(f"{name_option('loop')} of a cascade: give {name}, greater than 0")
     return kind

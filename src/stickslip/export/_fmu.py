@@ -26,7 +26,7 @@ from stickslip.export._analysis import fields_read
 from stickslip.export._c import safe
 from stickslip.export._text import Code, render
 from stickslip.export.job import Job
-from stickslip.identify.on_a_line import words
+from stickslip.messages import in_linear_units
 from stickslip.spec import Field, Surroundings
 
 VERSIONS = {"2.0": "fmi2", "3.0": "fmi3"}
@@ -115,11 +115,6 @@ def unit_named(unit: str) -> str:
     return plain
 
 
-def along_a_line(unit: str) -> str:
-    """The unit of a linear axis in place of that of a rotary one: N for N.m, m for rad, kg for kg.m2."""
-    return unit.replace("kg.m2", "kg").replace("N.m", "N").replace("rad", "m")
-
-
 def law_variables(job: Job) -> Iterable[Variable]:
     """Parameters and state of the law."""
     law, p = job.model.law, job.model.parameters
@@ -161,9 +156,7 @@ def surroundings_read(job: Job) -> Iterable[Variable]:
     defaults = Surroundings()._asdict()
     for name, unit in SURROUNDINGS.items():
         if name in read:
-            yield Variable(
-                name, f"u.{name}", "input", unit, c99.SURROUNDINGS[name].rpartition(",")[0], defaults[name]
-            )
+            yield Variable(name, f"u.{name}", "input", unit, c99.SURROUNDINGS[name][0], defaults[name])
 
 
 def numbered(variables: Iterable[Variable], linear: bool = False) -> list[Variable]:
@@ -173,7 +166,7 @@ def numbered(variables: Iterable[Variable], linear: bool = False) -> list[Variab
     for v in variables:
         name = v.name if v.name not in taken else f"contact.{v.name}"
         taken.add(name)
-        unit = along_a_line(v.unit) if linear else v.unit
+        unit = in_linear_units(v.unit) if linear else v.unit
         out.append(replace(v, name=name, unit=unit, reference=len(out) + 1))
     return out
 
@@ -270,8 +263,6 @@ def archive(
     described = render(f"fmu_{kind}.xml.j2", token="", **values)
     token = str(uuid.uuid5(uuid.NAMESPACE_URL, described + "".join(map(str, c_files.values()))))
     c_files[f"{x}_{kind}.c"] = render(f"fmu_{kind}.c.j2", token=token, **values)
-    if contents.linear:
-        c_files = {name: words(text) for name, text in c_files.items()}
     files: dict[str, str | bytes] = {
         "modelDescription.xml": render(f"fmu_{kind}.xml.j2", token=token, **values),
         **{f"sources/{name}": text for name, text in c_files.items()},

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.export.job import Check, Export
+from stickslip.messages import axis_unit
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -22,7 +23,7 @@ def checked(
     inputs: Mapping[str, Array],
     expected: Mapping[str, Array],
     bound: float = 0.0,
-    off: str = "N·m off the definition",
+    off: str = "",
 ) -> Check:
     """Validate the units of an export, and play them: their outputs may be `bound` off what is expected, (n,) each."""
     errors: dict[str, float] = {}
@@ -33,8 +34,8 @@ def checked(
         if isinstance(answer, Check):
             return answer
         errors[name] = float(np.abs(answer - np.column_stack([*expected.values()])).max())
-    worst = max(errors.values())
-    return Check(worst <= bound, f"FMPy: valid; at most {worst:.3g} {off}", errors)
+    worst, said = max(errors.values()), f"{axis_unit('N·m')} off the definition"
+    return Check(worst <= bound, f"FMPy: valid; at most {worst:.3g} {off or said}", errors)
 
 
 def played(

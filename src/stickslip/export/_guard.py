@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from stickslip.control.composition import LARGEST
 from stickslip.export._analysis import fields_read
 from stickslip.export._text import first_line
+from stickslip.messages import axis_unit
 
 REFUSES = "At an input that is not finite the torque is 0 and the state does not change."
 CLOCK = 1e-6
@@ -60,6 +61,6 @@ def _guard(step: ast.FunctionDef, entry: str, inner: str, read: list[str]) -> as
     )
     made = ast.parse(text).body[0]
     assert isinstance(made, ast.FunctionDef)
-    about = first_line(ast.get_docstring(step) or "") or "Torque at the end of the step, N·m."
+    about = first_line(ast.get_docstring(step) or "") or f"Torque at the end of the step, {axis_unit('N·m')}."
     made.body.insert(0, ast.Expr(ast.Constant(f"{about.rstrip('.')}. {REFUSES}")))
     return made

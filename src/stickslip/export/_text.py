@@ -14,6 +14,8 @@ import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from stickslip.messages import axis_unit
+
 if TYPE_CHECKING:
     import jinja2
 
@@ -114,7 +116,7 @@ def render(template: str, **values: Any) -> str:
     from stickslip import __version__
     from stickslip.control.composition import LARGEST
 
-    common = {"version": __version__, "largest": LARGEST}
+    common: dict[str, Any] = {"version": __version__, "largest": LARGEST, "unit": axis_unit}
     return str(_environment().get_template(template).render({**common, **values}))
 
 
@@ -136,6 +138,15 @@ def in_lines(equation: str) -> list[str]:
     return textwrap.wrap(folded(equation), 110, break_long_words=False)
 
 
+STATED = re.compile(r"(?<=[,.] )(?:N·m(?:/s)?|rad(?:[/·]s²?)?|kg·m²)(?=[,.:;]|$)")
+"""A unit as docstrings of laws state it: after a comma or a full stop, and before the next one."""
+
+
 def first_line(text: str) -> str:
-    """The summary of a docstring."""
-    return text.strip().splitlines()[0] if text.strip() else ""
+    """Return the summary of a docstring, its units those of the present axis."""
+    return in_units_of_axis(text.strip().splitlines()[0]) if text.strip() else ""
+
+
+def in_units_of_axis(text: str) -> str:
+    """Return a docstring with the units that it states written for the present axis."""
+    return STATED.sub(lambda found: axis_unit(found[0]), text)

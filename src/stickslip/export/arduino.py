@@ -13,6 +13,7 @@ from stickslip.export._c import HEADERS
 from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Target
+from stickslip.messages import axis_unit
 from stickslip.spec import Surroundings
 
 STUB = """/* What the example needs of Arduino.h. */
@@ -89,7 +90,7 @@ def tried(export: Export, x: str) -> Check:
         ran = c99.run(["./check"], folder)
         error = c99.worst_in(ran.stdout)
     tools = " and ".join(dict.fromkeys(command[0] for command in commands))
-    said = f"{tools} compile it; at most {error:.3g} N·m off the definition"
+    said = f"{tools} compile it; at most {error:.3g} {axis_unit('N·m')} off the definition"
     return Check(ran.returncode == 0, said, {"g++": error})
 
 

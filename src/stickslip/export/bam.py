@@ -22,6 +22,7 @@ from stickslip.export._text import render
 from stickslip.export.job import CannotCarry, Check, Export, Job
 from stickslip.export.nearest import COULOMB, STRIBECK, Curve, Nearest, carried
 from stickslip.export.target import Setting, Target, settings_of
+from stickslip.messages import name_setting
 from stickslip.model import Model
 
 KEYS = {
@@ -92,7 +93,7 @@ def written(job: Job) -> tuple[dict[str, Any], Nearest]:
     motor, external = float(settings["load_motor"]), float(settings["load_external"])
     wanted = str(settings["variant"])
     if wanted not in ("any", *LOADS):
-        raise InputError(f"--set variant={wanted}: choose any or one of {', '.join(LOADS)}")
+        raise InputError(f"{name_setting('variant', wanted)}: choose any or one of {', '.join(LOADS)}")
     forms, loaded = [COULOMB, STRIBECK], motor > 0.0 or external > 0.0
     if wanted in ("m1", "m3"):
         forms = [COULOMB]
@@ -130,7 +131,8 @@ def _checked(wanted: str, least: str) -> str:
     if wanted in holds[least]:
         return wanted
     raise CannotCarry(
-        f"bam's {wanted} would lose friction that grows with the load; leave --set variant={wanted} out for {least}, "
+        f"bam's {wanted} would lose friction that grows with the load; leave {name_setting('variant', wanted)} "
+        f"out for {least}, "
         "or set load_motor and load_external to 0"
     )
 

@@ -20,6 +20,7 @@ from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.nearest import Curve, Form, Nearest, carried, curve_of
 from stickslip.export.target import Setting, Target, settings_of
+from stickslip.messages import axis_unit, name_setting
 from stickslip.model import Model
 
 ENTRIES = 20
@@ -37,7 +38,7 @@ def write(job: Job) -> Export:
     settings = settings_of(TARGET, job.settings)
     notes = (NOTE, *found.notes)
     values: dict[str, Any] = {
-        **numbers, "x": job.name, "law": job.model.law, "notes": notes, "unit": settings["torque_per_unit"],
+        **numbers, "x": job.name, "law": job.model.law, "notes": notes, "scale": settings["torque_per_unit"],
         "lookahead": int(settings["reversal_lookahead"]), "cycles": int(settings["delay_cycles"]),
         "speed_unit": "um/s" if settings["motion"] == "linear" else "0.001 deg/s",
         "delay_unit": "0.1 um" if settings["motion"] == "linear" else "0.0001 deg",
@@ -54,7 +55,7 @@ def listed(job: Job) -> tuple[Nearest, dict[str, Any]]:
     settings = settings_of(TARGET, job.settings)
     motion = str(settings["motion"])
     if motion not in UNITS:
-        raise InputError(f"--set motion={motion}: choose rotary or linear")
+        raise InputError(f"{name_setting('motion', motion)}: choose rotary or linear")
     unit = float(settings["torque_per_unit"])
     found = carried(job, TARGET.name, [form_of(motion, unit, curve_of(job).size)])
     p = found.model.parameters
@@ -104,10 +105,12 @@ def delay_of(job: Job, given: str, motion: str) -> int:
         try:
             delay = int(given)
         except ValueError:
-            raise InputError(f"--set position_delay={given}: give a whole number, or auto") from None
+            raise InputError(
+                f"{name_setting('position_delay', given)}: give a whole number, or auto"
+            ) from None
         if not 0 <= delay <= LONGEST_DELAY:
             raise InputError(
-                f"--set position_delay={given}: it lies between 0 and {LONGEST_DELAY} (P-COMP-00043)"
+                f"{name_setting('position_delay', given)}: it lies between 0 and {LONGEST_DELAY} (P-COMP-00043)"
             )
         return delay
     curve = curve_of(job)
@@ -175,7 +178,9 @@ def check(job: Job, export: Export) -> Check:
     error = max(abs(table.torque(v) - 0.5 * (curve.torque(v) - curve.torque(-v))) for v in draw)
     passed = error <= 1.02 * found.residual + 1e-9 * found.size
     return Check(
-        passed, f"read back: at most {error:.3g} N·m off the sliding curve; {NOTE}", {"table": error}
+        passed,
+        f"read back: at most {error:.3g} {axis_unit('N·m')} off the sliding curve; {NOTE}",
+        {"table": error},
     )
 
 

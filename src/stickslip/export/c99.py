@@ -35,6 +35,7 @@ from stickslip.export.golden import (
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.nearest import read_by
 from stickslip.export.target import Target
+from stickslip.messages import axis_unit
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
@@ -46,12 +47,13 @@ STRUCTURES = {
     "z": "state", "dz": "state", "g": "state", "p": "parameters", "u": "surroundings", "n": "settings", "m": "memory",
 }  # fmt: skip
 SURROUNDINGS = {
-    "position": "position, rad",
-    "load": "normal load over the one of the parameters, -",
-    "temperature": "temperature, degC",
-    "time": "time since the start, s",
-    "applied": "torque applied to the contact from outside, N*m",
+    "position": ("position", "rad"),
+    "load": ("normal load over the one of the parameters", "-"),
+    "temperature": ("temperature", "degC"),
+    "time": ("time since the start", "s"),
+    "applied": ("torque applied to the contact from outside", "N*m"),
 }
+"""Meaning and unit."""
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-builtin", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion",
          "-Wdouble-promotion", "-Werror")  # fmt: skip
 
@@ -113,7 +115,7 @@ def write(job: Job) -> Export:
     columns = [*vectors, *([room] if job.single else [])]
     rows = [", ".join(repr(float(x)) for x in row) for row in zip(*columns)]
     table = [
-        {"name": f.name, "value": getattr(p, f.name), "unit": f.par.unit, "meaning": f.par.meaning}
+        {"name": f.name, "value": getattr(p, f.name), "unit": axis_unit(f.par.unit), "meaning": f.par.meaning}
         for f in law.fields
     ]
     return Export(
@@ -167,10 +169,16 @@ def structures(job: Job, dialect: Dialect) -> Iterable[Mapping[str, Any]]:
 def surroundings(about: str, dialect: Dialect) -> Mapping[str, Any]:
     """The structure of what friction depends on."""
     around = [
-        {"declared": f"{dialect.real} {name};", "meaning": SURROUNDINGS.get(name, name)}
+        {"declared": f"{dialect.real} {name};", "meaning": _meaning_around(name)}
         for name in Surroundings._fields
     ]
     return {"name": "surroundings", "about": about, "fields": around}
+
+
+def _meaning_around(name: str) -> str:
+    """Return meaning and unit of a surrounding quantity."""
+    meaning, unit = SURROUNDINGS.get(name, (name, ""))
+    return f"{meaning}, {axis_unit(unit)}" if unit else meaning
 
 
 def structure(name: str, about: str, fields: Sequence[Field], dialect: Dialect) -> Mapping[str, Any]:
@@ -178,7 +186,7 @@ def structure(name: str, about: str, fields: Sequence[Field], dialect: Dialect) 
     lines = [
         {
             "declared": f"{dialect.real} {safe(f.name)}{place_of(f, dialect)};",
-            "meaning": f"{f.par.meaning}, {f.par.unit}",
+            "meaning": f"{f.par.meaning}, {axis_unit(f.par.unit)}",
         }
         for f in fields
     ]
@@ -212,7 +220,7 @@ def initial(
     for f in fields:
         value = values[f.name]
         numbers = ", ".join(dialect.number(float(x)) for x in (value if f.per_element else (value,)))
-        about = f"{f.name}: {f.par.meaning}, {f.par.unit}"
+        about = f"{f.name}: {f.par.meaning}, {axis_unit(f.par.unit)}"
         yield {"value": f"{{ {numbers} }}" if f.per_element else numbers, "about": about}
     if not fields:
         yield {"value": "0", "about": "this law has none"}
@@ -256,9 +264,13 @@ def checked(export: Export, name: str) -> Check:
             ran = run(["./check"], folder)
             errors[compiler] = worst_in(ran.stdout)
             if ran.returncode:
-                return Check(False, f"{compiler}: {errors[compiler]:.3g} N·m off the definition", errors)
+                return Check(
+                    False, f"{compiler}: {errors[compiler]:.3g} {axis_unit('N·m')} off the definition", errors
+                )
     worst = max(errors.values())
-    return Check(True, f"{' and '.join(compilers)}: at most {worst:.3g} N·m off the definition", errors)
+    return Check(
+        True, f"{' and '.join(compilers)}: at most {worst:.3g} {axis_unit('N·m')} off the definition", errors
+    )
 
 
 def worst_in(printed: str) -> float:

@@ -17,7 +17,7 @@ from stickslip.control.controller import Controller
 from stickslip.export._analysis import Facts, analyse
 from stickslip.export._c import Dialect, functions, head
 from stickslip.export._step_error import PARTS, about_steps
-from stickslip.export._text import render, summary
+from stickslip.export._text import first_line, render, summary
 from stickslip.export.c99 import (
     SINGLE_BOUND,
     STRUCTURES,
@@ -49,7 +49,7 @@ PUBLIC = ("_sample", "_sample_turns", "_follow", "_follow_turns")
 NARROW = "float turns, float position, float reference_turns, float reference, "
 WIDE = {
     "_sample": "One sample; positions in double precision, so that their difference is rounded and not they.",
-    "_follow": "Watch one sample while another controls the axis with `torque`, N*m; positions in double precision.",
+    "_follow": "Watch one sample while another controls the axis with `torque`, N·m; positions in double precision.",
 }
 
 
@@ -158,7 +158,7 @@ def wide(known: Mapping[str, Facts], dialect: Dialect) -> Iterable[Mapping[str, 
         own = head(inner, known[inner], dialect)
         own = own.replace(f"{inner}({NARROW}", f"{name}(double position, double reference, ")
         rest = ", ".join(known[inner].arguments[4:])
-        yield {"about": about, "head": own, "call": f"{dialect.prefix}{inner}", "given": rest}
+        yield {"about": first_line(about), "head": own, "call": f"{dialect.prefix}{inner}", "given": rest}
 
 
 def structures(controller: Controller, dialect: Dialect) -> Iterable[Mapping[str, Any]]:

@@ -15,6 +15,7 @@ from stickslip.export._analysis import merged
 from stickslip.export.golden import Samples, changing, random_motion, sampled_torques
 from stickslip.export.job import IDENTIFIER, Check, Export
 from stickslip.export.nearest import read_by
+from stickslip.messages import axis_unit, name_option
 from stickslip.spec import Surroundings
 from stickslip.subset import named
 
@@ -46,7 +47,7 @@ def checked_name(name: str) -> str:
     """
     if not IDENTIFIER.fullmatch(name):
         raise InputError(
-            f"{name!r} is no name in most languages; use letters, digits and _, a letter first (--name)"
+            f"{name!r} is no name in most languages; use letters, digits and _, a letter first ({name_option('name')})"
         )
     return name
 
@@ -70,7 +71,12 @@ def learned_of(controller: Controller) -> Iterable[Mapping[str, str]]:
     told = controller.deviations
     for f in controller.learned_fields:
         deviation = f"{f.name}_deviation" if f.name in told else ""
-        yield {"name": f.name, "unit": f.par.unit, "meaning": f.par.meaning, "deviation": deviation}
+        yield {
+            "name": f.name,
+            "unit": axis_unit(f.par.unit),
+            "meaning": f.par.meaning,
+            "deviation": deviation,
+        }
 
 
 def counts_of(controller: Controller) -> dict[str, int]:
@@ -121,7 +127,7 @@ def given_by(controller: Controller) -> str:
     if controller.reference_velocity == "difference":
         parts.append("with the reference velocity formed as the difference of two reference positions")
     limit = controller.torque_limit
-    return ", ".join([*parts, *([f"within ±{limit:.6g} N·m"] if math.isfinite(limit) else [])])
+    return ", ".join([*parts, *([f"within ±{limit:.6g} {axis_unit('N·m')}"] if math.isfinite(limit) else [])])
 
 
 def _gives(part: str, block: ControlBlock) -> str:
@@ -133,8 +139,10 @@ def _gives(part: str, block: ControlBlock) -> str:
         velocity = "reference's" if block.law.place == "feedforward" else "measured"
         return f"{own['gain']:.6g} times the friction law's torque at the {velocity} velocity"
     if block.law.name == "inertia_feedforward":
-        offset = f"the constant torque `{part}_offset` = {own['offset']:.6g} N·m"
-        inertia = f"`{part}_inertia` = {own['inertia']:.6g} kg·m² times the reference's acceleration"
+        offset = f"the constant torque `{part}_offset` = {own['offset']:.6g} {axis_unit('N·m')}"
+        inertia = (
+            f"`{part}_inertia` = {own['inertia']:.6g} {axis_unit('kg·m²')} times the reference's acceleration"
+        )
         return ", ".join(words for words, x in ((offset, own["offset"]), (inertia, own["inertia"])) if x)
     return f"the torque of `{part}` ({block.law.title})"
 
@@ -147,7 +155,8 @@ def at_rest(controller: Controller) -> str:
     if not any(own.get("gain", 1.0) for own in fed.values()):
         return ""
     said = (
-        "At rest the reference velocity must be exactly 0: the feedforward takes -1e-9 rad/s for motion, too, and a "
+        f"At rest the reference velocity must be exactly 0: the feedforward takes -1e-9 {axis_unit('rad/s')} "
+        "for motion, too, and a "
         "law that jumps at rest then gives the whole friction."
     )
     names = [f"`{part}_deadband`" for part, own in fed.items() if "deadband" in own]
@@ -174,7 +183,12 @@ def table_of(controller: Controller) -> Iterable[Mapping[str, Any]]:
     """Its parameters for a table."""
     values = controller.values()
     for f in controller.fields:
-        yield {"name": f.name, "value": values[f.name], "unit": f.par.unit, "meaning": f.par.meaning}
+        yield {
+            "name": f.name,
+            "value": values[f.name],
+            "unit": axis_unit(f.par.unit),
+            "meaning": f.par.meaning,
+        }
 
 
 def head_of(controller: Controller, name: str) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from stickslip.export.golden import csv_of
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.target import Setting, Target, settings_of
 from stickslip.friction_levels import static_level
+from stickslip.messages import axis_unit
 from stickslip.subset import named
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -196,7 +197,7 @@ def check(job: Job, export: Export) -> Check:
     golden = np.genfromtxt(str(export.files["golden.csv"]).splitlines(), delimiter=",", names=True)
     still = np.zeros(golden.size)  # the package's axis takes no account of a slow change over time
     expected = {"position": golden["position_rad"], "velocity": golden["velocity_rad_s"]}
-    off = "rad or rad/s off the package's axis"
+    off = f"{axis_unit('rad')} or {axis_unit('rad/s')} off the package's axis"
     return checked(export, still, golden["dt_s"], {"torque": golden["torque_Nm"]}, expected, BOUND, off)
 
 

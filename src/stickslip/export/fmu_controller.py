@@ -73,7 +73,7 @@ def surroundings_read(controller: Controller) -> Iterable[Variable]:
     )  # it looks at all of them
     for name in ("load", "temperature"):
         if name in read:
-            about = c99.SURROUNDINGS[name].rpartition(",")[0]
+            about = c99.SURROUNDINGS[name][0]
             yield Variable(
                 name, f"u.{name}", "input", SURROUNDINGS[name], about, Surroundings()._asdict()[name]
             )

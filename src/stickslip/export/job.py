@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from stickslip.errors import InputError
 from stickslip.export._text import folded
+from stickslip.messages import name_option, rendered
 from stickslip.model import Model
 
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")
@@ -53,7 +54,8 @@ class Job:
     def __post_init__(self) -> None:
         if not IDENTIFIER.fullmatch(self.name):
             raise InputError(
-                f"{self.name!r} is no name in most languages; use letters, digits and _, a letter first (--name)"
+                f"{self.name!r} is no name in most languages; use letters, digits and _, a letter first "
+                f"({name_option('name')})"
             )
         if self.top_speed is not None and not 0.0 < self.top_speed < math.inf:
             raise InputError(f"the top speed is {self.top_speed:g} rad/s; give one greater than 0")
@@ -80,7 +82,7 @@ class Export:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "notes", tuple(map(folded, self.notes)))
+        object.__setattr__(self, "notes", tuple(map(folded, rendered(self.notes))))
 
 
 @dataclass(frozen=True)

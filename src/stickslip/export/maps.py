@@ -10,6 +10,7 @@ from stickslip.export.job import IDENTIFIER, Export
 from stickslip.export.position_tables import c_table, moteus, odrive, vesc
 from stickslip.export.position_waves import linuxcnc_waves, st_function, twincat_pou
 from stickslip.machines.position_map import PositionMap
+from stickslip.messages import name_option, name_setting
 
 CONSTANT = "torque_constant"
 
@@ -88,13 +89,14 @@ def written(
         raise UnknownName(f"setting of {target.name}", other, (CONSTANT,))
     if not IDENTIFIER.fullmatch(name):
         raise InputError(
-            f"{name!r} is no name in most languages; use letters, digits and _, a letter first (--name)"
+            f"{name!r} is no name in most languages; use letters, digits and _, a letter first ({name_option('name')})"
         )
     if not target.unit or target.unit == found.unit:
         return target.write(found, name)
     if constant is None:
         raise InputError(
-            f"{target.name} takes {target.unit} and the map is in {found.unit}; give --set {CONSTANT}=VALUE (N·m/A)"
+            f"{target.name} takes {target.unit} and the map is in {found.unit}; give "
+            f"{name_setting(CONSTANT, 'VALUE')} (N·m/A)"
         )
     return target.write(_in(found, target.unit, constant), name)
 
@@ -106,7 +108,7 @@ def _in(found: PositionMap, unit: str, constant: str | float) -> PositionMap:
     except ValueError:
         value = 0.0
     if not 0.0 < value < 1e12:
-        raise InputError(f"--set {CONSTANT}={constant}: give a number greater than 0 (N·m/A)")
+        raise InputError(f"{name_setting(CONSTANT, constant)}: give a number greater than 0 (N·m/A)")
     if found.unit not in ("A", "N·m"):
         raise InputError(f"a map in {found.unit} has no torque constant; give the motor's angle and torque")
     return found.scaled(value if unit == "N·m" else 1.0 / value, unit)

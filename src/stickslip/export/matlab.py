@@ -15,6 +15,7 @@ from stickslip.export._text import render, summary, text_in
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
+from stickslip.messages import axis_unit
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
@@ -105,7 +106,7 @@ def comment(text: str) -> str:
 
 def meaning_of(f: Field) -> str:
     """The meaning of a field and its unit, for the comment on its line."""
-    return text_in("m", f"{f.par.meaning}, {f.par.unit}")
+    return text_in("m", f"{f.par.meaning}, {axis_unit(f.par.unit)}")
 
 
 def _surroundings(job: Job) -> Iterable[str]:

@@ -25,6 +25,7 @@ from stickslip.export._text import Code, in_lines, render, sources, text_in
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
+from stickslip.messages import axis_unit
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
@@ -101,7 +102,7 @@ def declared(fields: Sequence[Field], p: Any, elements: int) -> Iterable[str]:
     for f in fields:
         size = len(getattr(p, f.name)) if p is not None and f.per_element else elements
         array = f"[{size}]" if f.per_element else ""
-        meaning = text_in("mo", f"{f.par.meaning}, {f.par.unit}")
+        meaning = text_in("mo", f"{f.par.meaning}, {axis_unit(f.par.unit)}")
         if p is None:
             each = "each " if f.per_element else ""
             yield Code(f'Real {safe(f.name)}{array}({each}start = 0.0, {each}fixed = true) "{meaning}";')

@@ -33,6 +33,7 @@ from stickslip.export.nearest import (
     with_constant,
 )
 from stickslip.export.target import Setting, Target, settings_of
+from stickslip.messages import axis_unit, name_setting
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 
@@ -97,7 +98,8 @@ def write(job: Job) -> Export:
     if constant := parted(model)[1]:
         notes = (
             *notes,
-            f"half of the difference between the directions, {constant:.4g} N·m against positive motion, is a constant "
+            f"half of the difference between the directions, {constant:.4g} {axis_unit('N·m')} against positive "
+            "motion, is a constant "
             "torque: the `general` actuator gives it, whatever its input; copy it with the joint",
         )
     text = xml(job, model)
@@ -145,7 +147,7 @@ def for_timestep(found: Nearest, step: float, inertia: float, contact: str) -> t
     the natural frequency of axis and bristle at most one over the step, and twice the damping of the bound.
     """
     if contact not in ("identified", "held"):
-        raise InputError(f"--set contact={contact}: give identified or held")
+        raise InputError(f"{name_setting('contact', contact)}: give identified or held")
     model, bound = found.model, holding_step(found.model)
     if step < bound:
         return model, found.notes
@@ -155,14 +157,16 @@ def for_timestep(found: Nearest, step: float, inertia: float, contact: str) -> t
     if contact == "identified":
         warning = (
             f"at a timestep of {step:g} s MuJoCo does not hold this contact at rest: it oscillates, and drifts under a "
-            f"load. It takes a timestep below {bound:.3g} s, or --set contact=held, which bends "
-            f"{p.fs / soft:.3g} rad before it breaks away instead of {p.fs / p.sigma0:.3g} rad"
+            f"load. It takes a timestep below {bound:.3g} s, or {name_setting('contact', 'held')}, which bends "
+            f"{p.fs / soft:.3g} {axis_unit('rad')} before it breaks away instead of {p.fs / p.sigma0:.3g} "
+            f"{axis_unit('rad')}"
         )
         return model, (*found.notes, warning)
     softer = Model(model.law, **{**model.parameters._asdict(), "sigma0": soft, "sigma1": damped})
     note = (
         f"contact softened to what a timestep of {step:g} s holds at rest: sigma0 {p.sigma0:.4g} to {soft:.4g} "
-        f"N·m/rad, sigma1 {p.sigma1:.4g} to {damped:.4g} N·m·s/rad; the sliding curve is as it was"
+        f"{axis_unit('N·m/rad')}, sigma1 {p.sigma1:.4g} to {damped:.4g} {axis_unit('N·m·s/rad')}; the sliding "
+        "curve is as it was"
     )
     return softer, (*found.notes, note)
 
@@ -268,7 +272,10 @@ def check(job: Job, export: Export) -> Check:
     pairs += [(loaded.actuator_biasprm[-1][0], -constant)] if constant else []
     error = max(abs(float(a) - b) for a, b in pairs)
     creep = drift(loaded, 0.5 * p.fc + constant)
-    said = f"MuJoCo reads it {error:.3g} off; half of the Coulomb torque moves it by {creep:.3g} rad in 1 s"
+    said = (
+        f"MuJoCo reads it {error:.3g} off; half of the Coulomb torque moves it by {creep:.3g} "
+        f"{axis_unit('rad')} in 1 s"
+    )
     return Check(error == 0.0, said, {"mujoco": error, "drift": creep})
 
 

@@ -23,6 +23,7 @@ from stickslip.export._analysis import fields_read
 from stickslip.export._sliding import Curve
 from stickslip.export._text import folded
 from stickslip.export.job import CannotCarry, Job
+from stickslip.messages import axis_unit, name_option
 from stickslip.model import Model
 from stickslip.spec import Bristle, Law, Mode
 from stickslip.subset import law_layouts, named
@@ -223,17 +224,18 @@ class Nearest:
         per = next((f for f in law.fields if f.per_element), None)
         if per is not None:
             return f"one of {len(getattr(p, per.name))} {per.par.per}s"
-        return ", ".join(f"{f.name} = {getattr(p, f.name):.5g} {f.par.unit}" for f in law.fields)
+        return ", ".join(f"{f.name} = {getattr(p, f.name):.5g} {axis_unit(f.par.unit)}" for f in law.fields)
 
     @property
     def error(self) -> str:
         """The residual, for people."""
         if self.residual <= EXACT * self.size:
-            return f"0 N·m off the sliding curve from 0 to {self.top:.3g} rad/s"
-        place = "at rest" if self.at == 0.0 else f"at {self.at:.3g} rad/s"
+            return f"0 {axis_unit('N·m')} off the sliding curve from 0 to {self.top:.3g} {axis_unit('rad/s')}"
+        place = "at rest" if self.at == 0.0 else f"at {self.at:.3g} {axis_unit('rad/s')}"
         return (
-            f"at most {self.residual:.3g} N·m ({100.0 * self.residual / self.size:.3g} %, {place}) off the sliding "
-            f"curve, {self.rms:.3g} N·m rms from 0 to {self.top:.3g} rad/s"
+            f"at most {self.residual:.3g} {axis_unit('N·m')} ({100.0 * self.residual / self.size:.3g} %, "
+            f"{place}) off the sliding "
+            f"curve, {self.rms:.3g} {axis_unit('N·m')} rms from 0 to {self.top:.3g} {axis_unit('rad/s')}"
         )
 
     @property
@@ -269,7 +271,8 @@ def carried(job: Job, target: str, forms: Sequence[Form], also_lost: Sequence[st
         return best
     raise CannotCarry(
         f"{target} carries {best.form.words}; {job.model.law.name} would lose {'; '.join(best.lost)}. The nearest is "
-        f"{best.values}: {best.error}; --top-speed gives another highest velocity. Take it with --nearest"
+        f"{best.values}: {best.error}; {name_option('top_speed')} gives another highest velocity. Take it with "
+        f"{name_option('nearest', True)}"
     )
 
 
@@ -364,7 +367,7 @@ def losses(curve: Curve, form: Form) -> list[str]:
         memory = "; non-local memory" if law.non_local_memory else ""
         out.append(f"pre-sliding and hysteresis ({', '.join(bends[:3]) or 'its states'}{memory})")
     if "slope" not in form.keeps and curve.slowest > 0.0:
-        out.append(f"its slope or band of rest up to {curve.slowest:.2g} rad/s")
+        out.append(f"its slope or band of rest up to {curve.slowest:.2g} {axis_unit('rad/s')}")
     if "direction" not in form.keeps and difference_beyond(curve, form) > EXACT * curve.size:
         out.append(CHANGE if "constant" in form.keeps else DIFFERENCE)
     read = surroundings_of(curve.given)

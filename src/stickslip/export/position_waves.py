@@ -13,6 +13,7 @@ from stickslip.export._text import text_in
 from stickslip.export.job import Export
 from stickslip.export.position_tables import left_of, whole_turn
 from stickslip.machines.position_map import PositionMap
+from stickslip.messages import name_option
 
 
 def st_function(found: PositionMap, name: str = "cogging") -> Export:
@@ -130,7 +131,7 @@ def _checked(found: PositionMap, target: str) -> str:
     whole_turn(found)
     if found.table:
         raise InputError(
-            f"{target} takes harmonics and this map is a table; take --to c99, moteus, odrive or vesc"
+            f"{target} takes harmonics and this map is a table; take {name_option('to', 'c99')}, moteus, odrive or vesc"
         )
     return left_of(found).sentence
 

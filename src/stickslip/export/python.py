@@ -14,10 +14,11 @@ from typing import Any
 
 from stickslip.export._guard import guarded
 from stickslip.export._step_error import about_steps
-from stickslip.export._text import Code, render, sources
+from stickslip.export._text import Code, in_units_of_axis, render, sources
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Check, Export, Job, counts_in
 from stickslip.export.target import Target
+from stickslip.messages import axis_unit
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
@@ -68,12 +69,12 @@ def count_by_constant(tree: ast.FunctionDef, counts: Iterable[str]) -> None:
 
 
 def indent_docstring(tree: ast.FunctionDef) -> None:
-    """Set the docstring in, which the unparser leaves as it is."""
-    text = ast.get_docstring(tree)
-    if text and "\n" in text:
+    """Indent the docstring, which the unparser leaves as it is, and write its units for the axis."""
+    text = in_units_of_axis(ast.get_docstring(tree) or "")
+    if text:
         assert isinstance(tree.body[0], ast.Expr)
         lines = ["    " + line if line else "" for line in text.splitlines()]
-        tree.body[0].value = ast.Constant("\n".join(lines).strip() + "\n    ")
+        tree.body[0].value = ast.Constant("\n".join(lines).strip() + ("\n    " if "\n" in text else ""))
 
 
 def number(value: Any) -> str:
@@ -84,14 +85,14 @@ def number(value: Any) -> str:
 def assigned(fields: Iterable[Field], values: Mapping[str, Any]) -> Iterable[str]:
     """Arguments with their values and what they mean."""
     for f in fields:
-        yield f"{f.name}={number(values[f.name])},  # {f.par.meaning}, {f.par.unit}"
+        yield f"{f.name}={number(values[f.name])},  # {f.par.meaning}, {axis_unit(f.par.unit)}"
 
 
 def cleared(fields: Iterable[Field]) -> Iterable[str]:
     """The same, at the start."""
     for f in fields:
         zero = f"[0.0] * {constant(f'{f.par.per}s_')}" if f.per_element else "0.0"
-        yield f"{f.name}={zero},  # {f.par.meaning}, {f.par.unit}"
+        yield f"{f.name}={zero},  # {f.par.meaning}, {axis_unit(f.par.unit)}"
 
 
 def check(job: Job, export: Export) -> Check:
@@ -109,7 +110,9 @@ def alone(export: Export, name: str, vectors: str) -> Check:
     if done.returncode not in (0, 1) or not done.stdout:
         return Check(False, f"the file does not run: {done.stderr.strip().splitlines()[-1:]}")
     error = float(done.stdout)
-    return Check(error == 0.0, f"at most {error:.3g} N·m off the definition", {"python": error})
+    return Check(
+        error == 0.0, f"at most {error:.3g} {axis_unit('N·m')} off the definition", {"python": error}
+    )
 
 
 TARGET = Target(

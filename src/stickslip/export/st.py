@@ -14,6 +14,7 @@ from stickslip.export._text import Code, in_lines, render, sources, summary, tex
 from stickslip.export.golden import PACE, as_csv, golden_around
 from stickslip.export.job import Export, Job, counts_in
 from stickslip.export.target import Target
+from stickslip.messages import axis_unit
 from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
@@ -101,7 +102,7 @@ def declared(
         if values:
             value = values[f.name]
             start = f" := [{', '.join(map(number, value))}]" if f.per_element else f" := {number(value)}"
-        meaning = text_in("st", f"{f.par.meaning}, {f.par.unit}")
+        meaning = text_in("st", f"{f.par.meaning}, {axis_unit(f.par.unit)}")
         yield Code(f"{word[f.name]} : {kind}{start}; (* {meaning} *)")
     if not fields:
         yield "none : LREAL;"

@@ -12,6 +12,7 @@ from stickslip.export._text import render
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.nearest import Curve, Nearest, carried
 from stickslip.export.target import Setting, Target, settings_of
+from stickslip.messages import axis_unit
 from stickslip.model import Model
 
 if TYPE_CHECKING:
@@ -85,7 +86,9 @@ def check(job: Job, export: Export) -> Check:
     table = Curve(model, found.top)
     error = max(abs(table.torque(v) - curve.torque(v)) for v in (*draw, *-draw))
     passed = error <= 1.02 * found.residual + 1e-9 * found.size
-    return Check(passed, f"read back: at most {error:.3g} N·m off the sliding curve", {"table": error})
+    return Check(
+        passed, f"read back: at most {error:.3g} {axis_unit('N·m')} off the sliding curve", {"table": error}
+    )
 
 
 TARGET = Target(

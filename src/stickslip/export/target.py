@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from stickslip.errors import InputError, UnknownName
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.nearest import Form
+from stickslip.messages import name_option, name_setting
 
 ANY_LAW = "any law, as it is"
 
@@ -42,15 +43,18 @@ class Setting:
         """
         if isinstance(self.default, str):
             if not str(value).isprintable() or not str(value):
-                raise InputError(f"--set {self.name}={value!r}: give printable text ({self.meaning})")
+                raise InputError(
+                    f"{name_setting(self.name, f'{value!r}')}: give printable text ({self.meaning})"
+                )
             return str(value)
         try:
             number = float(value)
         except ValueError:
-            raise InputError(f"--set {self.name}={value}: give a number ({self.meaning})") from None
+            raise InputError(f"{name_setting(self.name, value)}: give a number ({self.meaning})") from None
         if not (math.isfinite(number) and self.lower <= number <= self.upper):
             raise InputError(
-                f"--set {self.name}={value}: give a number from {self.lower:g} to {self.upper:g} ({self.meaning})"
+                f"{name_setting(self.name, value)}: give a number from {self.lower:g} to {self.upper:g} "
+                f"({self.meaning})"
             )
         return number
 
@@ -100,7 +104,8 @@ class Target:
         """
         if name in self.reserved:
             raise InputError(
-                f"--name {name}: the word, or a file of that name, is taken in {self.name}; give another name, such as "
+                f"{name_option('name', name)}: the word, or a file of that name, is taken in {self.name}; give "
+                "another name, such as "
                 f"{name}_friction"
             )
 
@@ -109,7 +114,10 @@ class Target:
         if name not in self.reserved:
             return name, ()
         free = f"{name}_friction"
-        return free, (f"the name is {free}, since {name} is taken in {self.name}; --name NAME gives another",)
+        return free, (
+            f"the name is {free}, since {name} is taken in {self.name}; {name_option('name', 'NAME')} "
+            "gives another",
+        )
 
     @property
     def carries(self) -> str:
@@ -133,6 +141,8 @@ def settings_of(target: Target, given: Mapping[str, str | float]) -> dict[str, s
     for name, setting in known.items():
         value = given.get(name, setting.default)
         if value is None:
-            raise InputError(f"{target.name} needs the {setting.meaning}; give it with --set {name}=VALUE")
+            raise InputError(
+                f"{target.name} needs the {setting.meaning}; give it with {name_setting(name, 'VALUE')}"
+            )
         out[name] = setting.checked(value)
     return out

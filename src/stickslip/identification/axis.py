@@ -61,6 +61,7 @@ from stickslip.identify.fit.uncertainty import verdict_on
 from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import Note, name_columns, name_option
 from stickslip.model import Model
 from stickslip.spec import Law
 
@@ -469,9 +470,7 @@ def finished(
     fit = details.get("slow_motion")
     combined = fit.combinations() if isinstance(fit, LawFit) else list[str]()
     last = (
-        [
-            f"Not identified: {', '.join(untold)}; other values of {'it' if len(untold) == 1 else 'them'} fit as well."
-        ]
+        [Note(f"Not identified: {', '.join(untold)}; other values fit equally well.", "not-identified")]
         if untold
         else []
     )
@@ -550,8 +549,9 @@ def refuse_slow(experiments: Sequence[Experiment]) -> None:
         if t.period >= SLOWEST:
             raise InputError(
                 f"{t.name}: samples are {t.period:.3g} s apart, too far for accelerations and reversals to be seen; "
-                "say the unit of the time if it is wrong (--map time=COLUMN:ms), log faster, or identify the curve of "
-                "constant speeds with --method sliding"
+                f"say the unit of the time if it is wrong ({name_columns(time='COLUMN:ms')}), log faster, or "
+                "identify the curve of "
+                f"constant speeds with {name_option('method', 'sliding')}"
             )
 
 
@@ -569,7 +569,7 @@ def refuse_weight(sliding: SlidingPosterior | None, axis: ServoAxis) -> None:
         raise InputError(
             f"a constant torque of {constant:.3g} {axis.unit('N·m')} acts, a weight, a spring or an offset, "
             f"larger than friction, {level:.3g}: it cannot be told from a difference between directions; leave "
-            "out --per-direction"
+            f"out {name_option('per_direction', True)}"
         )
 
 
@@ -584,7 +584,8 @@ def apart_from_weight(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
         return tuple(estimates)
     why = (
         f"friction of {forward:.4g} and {backward:.4g} may as well be {middle:.4g} both ways and a constant torque of "
-        f"{constant:.4g} {level['fc'].unit} (a weight, a spring, an offset); leave out --per-direction"
+        f"{constant:.4g} {level['fc'].unit} (a weight, a spring, an offset); leave out "
+        f"{name_option('per_direction', True)}"
     )
     both = ("fc", "fs", "fc_negative", "fs_negative")
     return tuple(
@@ -603,5 +604,5 @@ def refuse_known_torque(frozen: Sequence[str], values: Mapping[str, float], axis
     if "offset" in frozen and known != 0.0:
         raise InputError(
             f"offset = {known:g} {axis.unit('N·m')}: a constant torque that is known is not taken off friction per "
-            "direction; subtract it from the torque's column, or leave out --per-direction"
+            f"direction; subtract it from the torque's column, or leave out {name_option('per_direction', True)}"
         )

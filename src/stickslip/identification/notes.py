@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from stickslip.identification.sliding import PRESENT, SlidingPosterior
+from stickslip.messages import Note, name_option
 
 KNOWN_DELAY = 0.25
 """Rows: half-width of a delay up to which it is worth a sentence."""
@@ -18,8 +19,9 @@ KINDS = (
     (-0.5, "a mean over the row before"),
 )
 ALLOWED = ("elasticity", "elasticity of higher order", "play", "inertia by frequency", "no single inertia")
-CONTRADICTED = "The record contradicts the timing given (--torque-is, --delay)"
-"""How the sentence begins that says so."""
+CONTRADICTED = f"record contradicts the timing given ({name_option('torque_is')}, {name_option('delay')})"
+TIMING_CONTRADICTED = "timing-contradicted"
+"""Code of the note that states it."""
 
 
 class Drift(NamedTuple):
@@ -111,10 +113,9 @@ def against_given(found: SlidingPosterior, given: float) -> list[str]:
     skew = found.numbers["skew"]
     if skew.lower <= given <= skew.upper or found.numbers["inertia"].lower <= 0.0:
         return []
-    return [
-        f"{CONTRADICTED}: the torque acted {_when(skew.value)} (±{1e3 * skew.half:.2g} ms) its row on average, not "
-        f"{_when(given)} it. Leave both options out, or correct them."
-    ]
+    acted = f"the torque acted {_when(skew.value)} (±{1e3 * skew.half:.2g} ms) its row on average"
+    said = f"The {CONTRADICTED}: {acted}, not {_when(given)} it. Leave both out, or correct them."
+    return [Note(said, TIMING_CONTRADICTED)]
 
 
 def _when(skew: float) -> str:

@@ -25,6 +25,7 @@ from stickslip.identification.search import Asked, Fit, Start, settle
 from stickslip.identify.experiment import Experiment, insist_on_motion
 from stickslip.identify.fit.student import student_quantile
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import name_option
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -290,7 +291,7 @@ def estimate_sliding(
         side = "after" if found.fits[0].skew < 0.0 else "before"
         raise LateTorque(
             f"the torque acted {LATEST - 1} rows or more {side} its row; log torque and motion by one clock, or state "
-            "the delay (--delay)"
+            f"the delay ({name_option('delay')})"
         )
     return found
 

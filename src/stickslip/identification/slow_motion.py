@@ -57,6 +57,7 @@ from stickslip.identify.observer.innovations import (
 from stickslip.identify.observer.observer import EXACT, ROUGH, prepare
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import name_parameter
 from stickslip.model import Model
 from stickslip.simulation.prescribed.steady import Steady
 from stickslip.spec import Law, Par
@@ -299,7 +300,8 @@ def search_law(
     ranked = [c for _, c in sorted(zip(costs, criteria, strict=True), key=lambda x: x[0]) if math.isfinite(_)]
     if not ranked:
         raise InputError(
-            f"{law.name}: no simulation from the starting values succeeds; give others with --set NAME=VALUE (values)"
+            f"{law.name}: no simulation from the starting values succeeds; give others with "
+            f"{name_parameter('NAME', 'VALUE')}"
         )
     running = mapped(lambda c: (c, c.search(c.vector.start)), ranked[:STARTS])
     mapped(operator.methodcaller("run", min(steps, FIRST_STEPS), SETTLED), [s for _, s in running])
@@ -477,7 +479,7 @@ def compliant_refused(
         )
     else:
         return list(estimates)
-    why = f"only reversals determine it, {why}; record slow reversals with a sensor at the load"
+    why = f"determined by reversals only, {why}; record slow reversals with a sensor at the load"
     return [
         replace(e, identified=False, verdict=why, cause=cause)
         if e.identified and of_presliding(law, p, e.name, sliding.speeds) else e for e in estimates

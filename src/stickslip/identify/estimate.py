@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from stickslip.errors import UnknownName
+from stickslip.machines.servo import ServoAxis
+from stickslip.messages import render, rendered
 from stickslip.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -19,6 +21,7 @@ def silent(_what: str) -> None:
     """Tell nobody how far an identification is."""
 
 
+LINEAR = ServoAxis(motion="linear")
 DECADES = 4.0
 """That an interval spans at most where its ends are worth printing."""
 
@@ -55,6 +58,9 @@ class Estimate:
     verdict: str = ""
     cause: str = ""
     share: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "verdict", render(self.verdict))
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -185,11 +191,25 @@ class Identification:
     findings: tuple[Any, ...] = ()
     held: tuple[Held, ...] = ()
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "notes", rendered(self.notes))
+        object.__setattr__(self, "measure_next", rendered(self.measure_next))
+
     def __getitem__(self, name: str) -> Estimate:
         for estimate in self.estimates:
             if estimate.name == name:
                 return estimate
         raise UnknownName("estimate", name, [e.name for e in self.estimates])
+
+    def of_linear_axis(self) -> Identification:
+        """Return the same numbers with the units of a linear axis; ``rms_Nm`` is then ``rms_N``."""
+        details: dict[str, Any] = {"axis": LINEAR, **self.details}
+        if "comparison" in details:
+            details["comparison"] = {
+                name: _in_newtons(cells) for name, cells in details["comparison"].items()
+            }
+        estimates = tuple(replace(e, unit=LINEAR.unit(e.unit)) for e in self.estimates)
+        return replace(self, estimates=estimates, misfit=_in_newtons(self.misfit), details=details)
 
     def misfit_unit(self, name: str) -> str:
         """Unit of a number of `misfit`; empty for a ratio or a count."""
@@ -246,3 +266,8 @@ class Identification:
 def missing_fall(misfit: Mapping[str, float]) -> float:
     """By how much friction falls with velocity where the law has no fall, N·m (N); 0 where it misses none."""
     return next((misfit[k] for k in ("fall_missing_Nm", "fall_missing_N") if k in misfit), 0.0)
+
+
+def _in_newtons(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """Return numbers under names that end with their unit: ``_N`` in place of ``_Nm``."""
+    return {f"{k.removesuffix('_Nm')}_N" if k.endswith("_Nm") else k: v for k, v in numbers.items()}

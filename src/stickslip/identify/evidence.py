@@ -10,6 +10,7 @@ import numpy as np
 
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.parameter_vector import Vector
+from stickslip.messages import axis_unit
 from stickslip.simulation.prescribed.steady import Steady
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -54,7 +55,7 @@ def bounded_verdicts(
         above = e.upper >= most * (1.0 - 1e-6)
         bound = e.identified and (above or e.lower <= least * (1.0 + 1e-6))
         side, edge = ("above", most) if above else ("below", least)
-        why = f"no data limit it from {side} but {what} ({edge:.4g} {e.unit})"
+        why = f"no data limit it from {side} but {what} ({edge:.4g} {axis_unit(e.unit)})"
         out.append(replace(e, identified=False, verdict=why) if bound else e)
     return tuple(out)
 
@@ -69,7 +70,10 @@ def without_inverted_rest(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]
     for e in estimates:
         level = levels.get(e.name.replace("fs", "fc", 1)) if e.name.partition("_")[0] == "fs" else None
         if e.identified and level is not None and level.identified and e.value < level.value:
-            why = f"it is below {level.name}, {level.value:.4g} {level.unit}: friction rises with velocity from rest"
+            why = (
+                f"it is below {level.name}, {level.value:.4g} {axis_unit(level.unit)}: friction rises with "
+                "velocity from rest"
+            )
             out.append(replace(e, identified=False, verdict=f"{why}, which is no break-away"))
         else:
             out.append(e)

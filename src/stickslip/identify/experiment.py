@@ -10,6 +10,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import name_columns, name_loop
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 
@@ -95,8 +96,9 @@ class Experiment:
         if self.drive is None and not self.closed_loop:
             raise InputError(
                 f"{self.name}: neither the drive's signal nor a reference position with its controller is known; map "
-                "the torque or current (--map torque=COLUMN:UNIT), or the reference (--map position_reference=COLUMN) "
-                "and give its controller (--loop kp=..,kd=..)"
+                f"the torque or current ({name_columns(torque='COLUMN:UNIT')}), or the reference "
+                f"({name_columns(position_reference='COLUMN')}) "
+                f"and give its controller ({name_loop('kp=..,kd=..')})"
             )
 
     @property
@@ -202,12 +204,12 @@ def insist_on_motion(experiments: Sequence[Experiment]) -> None:
         place = experiments[0].position[0]
         raise InputError(
             f"{names}: the position is {place:g} throughout, so that the axis never moved; record a motion, or say "
-            "which column it is (--map position=COLUMN:UNIT)"
+            f"which column it is ({name_columns(position='COLUMN:UNIT')})"
         )
     if not any(t.drive is None or np.any(t.drive != 0.0) for t in moved):
         raise InputError(
             f"{names}: the drive's signal is 0 wherever the axis moves; check that it was logged, or say which column "
-            "it is (--map torque=COLUMN:UNIT)"
+            f"it is ({name_columns(torque='COLUMN:UNIT')})"
         )
 
 
@@ -253,7 +255,7 @@ def experiment_of(
     if axis.gravity == "pendulum" and "position" in record.meta.get("derived", {}):
         raise InputError(
             "the record has no channel 'position', and a velocity does not say at which angle a pendulum hangs; map "
-            "the position (--map position=COLUMN:UNIT)"
+            f"the position ({name_columns(position='COLUMN:UNIT')})"
         )
     found = next((c for c in DRIVES if c in record.channels), None)
     reference = next((c for c in REFERENCES if c in record.channels), None)

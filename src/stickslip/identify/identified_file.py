@@ -17,6 +17,7 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.motion import Motion, motion_in
 from stickslip.machines.identified import train_in
 from stickslip.machines.two_inertias import TwoInertias
+from stickslip.messages import in_linear_units, name_file
 from stickslip.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -67,9 +68,7 @@ class Identified:
 
     def unit(self, angular: str) -> str:
         """A unit of the angular system in the axis's own."""
-        if self.motion == "rotary":
-            return angular
-        return angular.replace("kg·m²", "kg").replace("N·m", "N").replace("rad", "m")
+        return angular if self.motion == "rotary" else in_linear_units(angular)
 
     @property
     def sampled(self) -> tuple[float, str]:
@@ -124,16 +123,22 @@ def identified_in(table: Table) -> Identified:
         matrix = np.array(_table(content, "correlation", file).get("matrix", []), dtype=np.float64)
         matrix = matrix.reshape(len(estimates), len(estimates))
     except KeyError as error:
-        raise InputError(f"{file}: one of its estimates lacks {error}; identify the axis again") from None
+        raise InputError(
+            f"{name_file(file)}: one of its estimates lacks {error}; identify the axis again"
+        ) from None
     except (TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"{file}: its estimates cannot be read ({error}); identify the axis again") from None
+        raise InputError(
+            f"{name_file(file)}: its estimates cannot be read ({error}); identify the axis again"
+        ) from None
     axis = dict(_table(content, "axis", file))
     try:
         speeds = {
             k: np.abs(np.array(v, dtype=np.float64)) for k, v in _table(content, "speeds", file).items()
         }
     except (TypeError, ValueError) as error:
-        raise InputError(f"{file}: its speeds cannot be read ({error}); identify the axis again") from None
+        raise InputError(
+            f"{name_file(file)}: its speeds cannot be read ({error}); identify the axis again"
+        ) from None
     return Identified(
         file, model, estimates, np.where(np.isfinite(matrix), matrix, np.eye(len(estimates))),
         axis, str(content.get("motion", "rotary")), tuple(_tables(content, "data", file)),
@@ -149,7 +154,9 @@ def _table(content: Mapping[str, Any], name: str, file: Path) -> dict[str, Any]:
     """A table of a model's file; empty if it has none."""
     value: Any = content.get(name, {})
     if not isinstance(value, dict):
-        raise InputError(f"{file}: {name} = {value!r} must be a table [{name}]; identify the axis again")
+        raise InputError(
+            f"{name_file(file)}: {name} = {value!r} must be a table [{name}]; identify the axis again"
+        )
     return cast("dict[str, Any]", value)
 
 
@@ -157,7 +164,9 @@ def _tables(content: Mapping[str, Any], name: str, file: Path) -> list[dict[str,
     """A list of tables of a model's file; empty if it has none."""
     value: Any = content.get(name, [])
     if not isinstance(value, list) or not all(isinstance(e, dict) for e in cast("list[Any]", value)):
-        raise InputError(f"{file}: {name} = {value!r} must be tables [[{name}]]; identify the axis again")
+        raise InputError(
+            f"{name_file(file)}: {name} = {value!r} must be tables [[{name}]]; identify the axis again"
+        )
     return cast("list[dict[str, Any]]", value)
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.messages import name_file, name_option
 from stickslip.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -165,7 +166,7 @@ def motion_in(content: Mapping[str, Any], file: str) -> Motion | None:
         ]
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
-            f"{file}: its table [trajectory] cannot be read ({error}); identify the axis again"
+            f"{name_file(file)}: its table [trajectory] cannot be read ({error}); identify the axis again"
         ) from None
     return Motion(*columns, source=str(table.get("source", file)))
 
@@ -187,7 +188,8 @@ def motion_of(record: Record, source: str = "") -> Motion:
     time, position = time[rows], position[rows]
     if time.size < 2:
         raise InputError(
-            f"{source or 'the record'} has too few rows for a motion; give --motion or --amplitude"
+            f"{source or 'the record'} has too few rows for a motion; give {name_option('motion')} or "
+            f"{name_option('amplitude')}"
         )
     every = max((time[-1] - time[0]) / (POINTS - 1), float(np.median(np.diff(time))))
     count = max(2, 1 + round((time[-1] - time[0]) / every))

@@ -15,6 +15,7 @@ from stickslip.machines.contact import Contact
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Harmonics
 from stickslip.machines.two_inertias import TwoInertias
+from stickslip.messages import name_file
 from stickslip.model import Model
 
 NOTE = "As identified from {records}; amplifier and encoder are ideal, a constant torque is not in it."
@@ -76,8 +77,10 @@ def train_in(content: Mapping[str, Any], file: str) -> TwoInertias | None:
     try:
         return TwoInertias.from_dict(content["drivetrain"])
     except KeyError as error:
-        raise InputError(f"{file}: its drivetrain lacks {error}; identify the axis again") from None
+        raise InputError(
+            f"{name_file(file)}: its drivetrain lacks {error}; identify the axis again"
+        ) from None
     except (TypeError, ValueError, ParameterError) as error:
         raise InputError(
-            f"{file}: its drivetrain cannot be read ({error}); identify the axis again"
+            f"{name_file(file)}: its drivetrain cannot be read ({error}); identify the axis again"
         ) from None

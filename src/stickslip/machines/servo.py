@@ -12,6 +12,7 @@ from typing import Any
 
 from stickslip.arguments import no_number
 from stickslip.errors import ParameterError
+from stickslip.messages import in_linear_units, name_option
 from stickslip.rules import is_number
 
 SIDES = ("motor", "load")
@@ -80,11 +81,13 @@ class Motor:
     def _needed(self, name: str, quantity: str) -> float:
         value = getattr(self, name)
         if value is None:
-            option = f"--{name.replace('_', '-')}"
-            also = ", or --drive-gain, the torque per unit of the signal (of a linear motor --force-constant)"
+            also = (
+                f", or {name_option('drive_gain')}, the torque per unit of the signal (of a linear motor "
+                f"{name_option('force_constant')})"
+            )
             also = "" if name == "resistance" else also
             raise ParameterError(
-                f"motor: a drive signal that is a {quantity} needs {name}; give {option}{also}"
+                f"motor: a drive signal that is a {quantity} needs {name}; give {name_option(name)}{also}"
             )
         return value
 
@@ -136,7 +139,7 @@ class ServoAxis:
         if self.motion == "linear" and self.gravity == "pendulum":
             raise ParameterError(
                 "axis: a pendulum turns, and this axis moves along a line, where weight is part of the offset; leave "
-                "out --pendulum"
+                f"out {name_option('pendulum', True)}"
             )
         positive("axis", "gear_ratio", self.gear_ratio, "-")
         if self.drive_gain is not None:
@@ -161,6 +164,4 @@ class ServoAxis:
 
     def unit(self, angular: str) -> str:
         """A unit of the angular system in the axis's own: N·m becomes N, rad becomes m, kg·m² becomes kg."""
-        if self.motion == "rotary":
-            return angular
-        return angular.replace("kg·m²", "kg").replace("N·m", "N").replace("rad", "m")
+        return angular if self.motion == "rotary" else in_linear_units(angular)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from stickslip.errors import InputError, suggestion
 from stickslip.finding import Finding
+from stickslip.messages import name_columns, name_option
 from stickslip.readers._joints import MAIN, Joints, listed_names, with_rates
 from stickslip.readers._names import ALIASES, KINDS, ROLES, Name, motor_force, role_of, words
 from stickslip.readers._units import in_its_case, may_be_unit, parse_unit, spellings
@@ -63,7 +64,8 @@ def parse_mapping(mapping: Mapping[str, str] | Sequence[str]) -> dict[str, str]:
             role, equals, column = text.partition("=")
             if not equals or not column.strip():
                 raise InputError(
-                    f"--map {text!r} must be CHANNEL=COLUMN or CHANNEL=COLUMN:UNIT, such as position=q_deg:deg"
+                    f"{name_option('map')} {text!r} must be CHANNEL=COLUMN or CHANNEL=COLUMN:UNIT, such as "
+                    "position=q_deg:deg"
                 )
             pairs.append((role, column))
     out: dict[str, str] = {}
@@ -71,10 +73,10 @@ def parse_mapping(mapping: Mapping[str, str] | Sequence[str]) -> dict[str, str]:
         role = ALIASES.get(written.strip(), written.strip())
         if role not in KINDS:
             raise InputError(
-                f"--map names the unknown channel {written!r}; {suggestion(written, [*ROLES, *ALIASES])}"
+                f"{name_option('map')} names the unknown channel {written!r}; {suggestion(written, [*ROLES, *ALIASES])}"
             )
         if role in out:
-            raise InputError(f"--map gives {role} twice; give it once")
+            raise InputError(f"{name_option('map')} gives {role} twice; give it once")
         out[role] = column.strip()
     return out
 
@@ -139,7 +141,8 @@ def meant(table: Table, mapping: Mapping[str, str]) -> dict[str, str]:
     other = mapping.get("current", text)
     if other not in (text, "none"):
         raise InputError(
-            f"{_as_said('torque', text)} is a current, and {_as_said('current', other)} names another; give one of them"
+            f"{name_columns(torque=text)} is a current, and {name_columns(current=other)} names another; give one of "
+            "them"
         )
     return {**mapping, "motor_torque": "none", "current": text}
 
@@ -157,11 +160,6 @@ def _is_current(table: Table, text: str) -> bool:
     return parsed is not None and parsed.kind == "current"
 
 
-def _as_said(role: str, text: str) -> str:
-    """An option ``--map``, in quotes where a shell asks for them."""
-    return f"--map {role}={text}" if re.fullmatch(r"[\w.:·%/@-]+", text) else f"--map '{role}={text}'"
-
-
 def _explicit(table: Table, role: str, text: str) -> Choice:
     """What the user says: COLUMN, COLUMN:UNIT, with @load or @motor behind."""
     side = ""
@@ -172,7 +170,7 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
         name, unit = (part.strip() for part in text.rsplit(":", 1))
     column = _find(table, name)
     if column is None:
-        raise InputError(f"{_as_said(role, text)}: {_absent(table, name)}")
+        raise InputError(f"{name_columns(**{role: text})}: {_absent(table, name)}")
     if unit:
         unit = in_its_case(unit, KINDS[role]) or unit
         parsed = None if unit.lower() in AMBIGUOUS else parse_unit(unit)
@@ -181,11 +179,11 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
             what = AMBIGUOUS.get(unit.lower(), what)
             driven = role == "motor_torque" and parsed is not None and parsed.kind == "voltage"
             remedy = (
-                "map it as voltage and give --resistance and --torque-constant"
+                f"map it as voltage and give {name_option('resistance')} and {name_option('torque_constant')}"
                 if driven
                 else f"{role} takes {spellings(KINDS[role])}"
             )
-            raise InputError(f"{_as_said(role, text)}: {unit!r} {what}; {remedy}")
+            raise InputError(f"{name_columns(**{role: text})}: {unit!r} {what}; {remedy}")
         return Choice(role, column.name, unit, "map", side)
     read = role_of(column.name, _unit_of(column))
     guess = _guessed(role, column, read)
@@ -232,7 +230,7 @@ def _doubtful(column: Column) -> Finding:
         "note",
         "ambiguous-column",
         f"column {name!r} was taken as the motor's force in N; it may be a normal force",
-        remedy=f"if it is, say --map torque=none --map load={name}:N",
+        remedy=f"if it is, say {name_columns(torque='none', load=f'{name}:N')}",
     )
 
 
@@ -265,11 +263,11 @@ def _pick(
             # Drives call their torque or utilisation "load" as well.
             name = unsure[0].name
             doubt = f"column {name!r} has no unit: it may be a normal force, a torque or a utilisation; it is not used"
-            remedy = f"if it is the normal force, say --map load={name}:N"
+            remedy = f"if it is the normal force, say {name_columns(load=f'{name}:N')}"
             return None, [Finding("note", "not-used", doubt, remedy=remedy)]
     if not candidates:
         return None, []
-    remedy = f"if another is meant, say --map {role}=COLUMN"
+    remedy = f"if another is meant, say {name_columns(**{role: 'COLUMN'})}"
     listed = listed_names(candidates)
     ranked = sorted(candidates, key=lambda c: _merit(names[c.name]), reverse=True)
     first = ranked[0]
@@ -299,7 +297,7 @@ def _pick(
                 "warning",
                 "ambiguous-column",
                 f"{role} may be any of {listed}; none was taken",
-                remedy=f"say {_as_said(role, first.name)}, or another, to use one",
+                remedy=f"say {name_columns(**{role: first.name})}, or another, to use one",
             )
         ]
     return first, [
@@ -307,7 +305,7 @@ def _pick(
             "error",
             "ambiguous-column",
             f"{role} may be any of {listed}",
-            remedy=f"say which, such as {_as_said(role, first.name)}",
+            remedy=f"say which, such as {name_columns(**{role: first.name})}",
         )
     ]
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.messages import name_columns, name_option
 from stickslip.readers._choose import Choice
 from stickslip.readers._column_groups import epoch_unit
 from stickslip.readers._stated_period import stated_period
@@ -74,7 +75,9 @@ def time_of(
         if not (math.isfinite(sample_time) and sample_time > 0.0):
             raise InputError(f"sample_time = {sample_time:g} must be greater than 0 s")
         if first is None:
-            raise InputError("no column is known to be a channel; say which with --map position=COLUMN:UNIT")
+            raise InputError(
+                f"no column is known to be a channel; say which with {name_columns(position='COLUMN:UNIT')}"
+            )
         if (choice := by_role.pop("time", None)) is not None:
             found += _overruled(choice, columns[choice.column].values, sample_time)
         return np.arange(first.values.size, dtype=np.float64) * sample_time, 0.0, found
@@ -105,15 +108,19 @@ def time_of(
         name, step = period
         stated = f"{name} = {table.constants[name]:g}"
         made = f"there is no column of times; they were made from {stated}, as {step:g} s a sample"
-        found.append(Finding("warning", "time-made", made, remedy="if wrong, give --sample-time SECONDS"))
+        found.append(
+            Finding(
+                "warning", "time-made", made, remedy=f"if wrong, give {name_option('sample_time', 'SECONDS')}"
+            )
+        )
         return np.arange(first.values.size, dtype=np.float64) * step, 0.0, found
     if first is None:
         raise InputError(
             f"no column is known to be a channel among {_some(table)}; say which is which, "
-            f"such as --map time=COLUMN:s --map position=COLUMN:deg{_of_tool(table)}"
+            f"such as {name_columns(time='COLUMN:s', position='COLUMN:deg')}{_of_tool(table)}"
         )
     raise NoTimes(
-        f"no column of times among {_some(table)}; say which with --map time=COLUMN:UNIT, or give "
+        f"no column of times among {_some(table)}; say which with {name_columns(time='COLUMN:UNIT')}, or give "
         f"{_by_header(table)}{_as_steady(by_role)}"
     )
 
@@ -135,14 +142,20 @@ def _of_tool(table: Table) -> str:
 def _as_steady(by_role: Mapping[str, Choice]) -> str:
     """Return what a table of steady points needs, to end an error; empty if this cannot be one."""
     if may_be_steady(by_role):
-        return "; a table of constant velocities and their torques is for --method sliding"
+        return f"; a table of constant velocities and their torques is for {name_option('method', 'sliding')}"
     parts = {"velocity": "velocity" in by_role, "torque": bool(by_role.keys() & EFFORTS)}
     if "position" in by_role and all(parts.values()):
-        return "; if its rows are steady points (--method sliding), say --map position=none"
+        return (
+            f"; if its rows are steady points ({name_option('method', 'sliding')}), say "
+            f"{name_columns(position='none')}"
+        )
     if "position" in by_role or not any(parts.values()):
         return ""
     lacking = next(name for name, known in parts.items() if not known)
-    return f"; for a table of steady points (--method sliding) give --map {lacking}=COLUMN:UNIT"
+    return (
+        f"; for a table of steady points ({name_option('method', 'sliding')}) give "
+        f"{name_columns(**{lacking: 'COLUMN:UNIT'})}"
+    )
 
 
 def may_be_steady(by_role: Mapping[str, Choice]) -> bool:
@@ -153,9 +166,9 @@ def may_be_steady(by_role: Mapping[str, Choice]) -> bool:
 def _by_header(table: Table) -> str:
     """The option that says the period, with the one that the header states."""
     if (found := stated_period(table.constants)) is None:
-        return "--sample-time SECONDS"
+        return name_option("sample_time", "SECONDS")
     name, text, period = found
-    return f"--sample-time {period:.6g}, as the header says ({name}: {text})"
+    return f"{name_option('sample_time', f'{period:.6g}')}, as the header says ({name}: {text})"
 
 
 def times_of(table: Table, choices: Sequence[Choice], sample_time: float | None) -> tuple[Array, float]:
@@ -196,7 +209,12 @@ def _overruled(choice: Choice, time: Array, sample_time: float) -> list[Finding]
         f"{own:g} s apart"
     )
     return [
-        Finding("warning", "time-overruled", said, remedy="leave --sample-time out if the column is right")
+        Finding(
+            "warning",
+            "time-overruled",
+            said,
+            remedy=f"leave {name_option('sample_time')} out if the column is right",
+        )
     ]
 
 
@@ -295,7 +313,8 @@ def on_clock(column: Column, time: Array, origin: float, role: str) -> tuple[Arr
     if column.clock is None:
         if column.values.size != time.size:
             raise InputError(f"{role}: column {column.name!r} has {column.values.size} values, time has {time.size}; "
-                             f"map columns of one table, or leave it out with --map {role}=none")  # fmt: skip
+                             "map columns of one table, or leave it out with "
+                             f"{name_columns(**{role: 'none'})}")  # fmt: skip
         return column.values, []
     own = column.clock - origin
     if own.shape == time.shape and np.allclose(own, time, rtol=0.0, atol=1e-9, equal_nan=True):

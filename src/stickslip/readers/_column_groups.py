@@ -20,6 +20,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.messages import name_columns, name_option
 from stickslip.readers._cells import cell, moment
 from stickslip.readers._names import role_of, words
 from stickslip.readers._units import may_be_unit, parse_unit
@@ -317,7 +318,12 @@ def timed_columns(
         if not known and factor == 1.0 and not findings:
             message = f"column {names[j]!r} states no unit: its times were taken in s"
             findings = [
-                Finding("warning", "time-unit", message, remedy="if wrong, give --sample-time SECONDS")
+                Finding(
+                    "warning",
+                    "time-unit",
+                    message,
+                    remedy=f"if wrong, give {name_option('sample_time', 'SECONDS')}",
+                )
             ]
     return _columns(names, units, starts, values, times), findings
 
@@ -393,7 +399,12 @@ def _stated_seconds(ticks: Array, interval: str, name: str, findings: list[Findi
     )
     if not any(f.code == "time-unit" for f in findings):
         findings.append(
-            Finding("warning", "time-unit", message, remedy="if wrong, give --sample-time SECONDS")
+            Finding(
+                "warning",
+                "time-unit",
+                message,
+                remedy=f"if wrong, give {name_option('sample_time', 'SECONDS')}",
+            )
         )
     return factor * ticks
 
@@ -432,7 +443,7 @@ def scaled_channels(layout: Layout) -> list[Finding]:
     message = (
         f"{listed}: the file does not state whether the values are scaled already; they were read as they are"
     )
-    remedy = "export with ScaleValues, or give the scale with the unit, such as --map torque=COLUMN:0.1Nm"
+    remedy = f"export with ScaleValues, or give the scale with the unit, such as {name_columns(torque='COLUMN:0.1Nm')}"
     return [Finding("note", "scaled", message, remedy=remedy)]
 
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip.finding import Finding
+from stickslip.messages import name_columns
 from stickslip.readers._names import Name
 from stickslip.readers.table_columns import Array, Column
 
@@ -84,9 +85,9 @@ class Joints:
         message = f"{role} may be any of {listed_names(candidates)}: the file has several axes"
         if role == "position" and drives and not driven and self.names[own[0].name].family.endswith("[]"):
             message += ", and its torque or current names none"
-            remedy = f"choose the right one with --map {role}=COLUMN"
+            remedy = f"choose the right one with {name_columns(**{role: 'COLUMN'})}"
             return own, [Finding("error", "ambiguous-column", message, remedy=remedy)]
-        remedy = f"if another is meant, give --map {role}=COLUMN"
+        remedy = f"if another is meant, give {name_columns(**{role: 'COLUMN'})}"
         return own, [
             Finding("warning", "ambiguous-column", f"{message}; axis {axis.upper()} was taken", remedy=remedy)
         ]
@@ -104,7 +105,7 @@ class Joints:
             level,
             "ambiguous-column",
             message,
-            remedy=f"choose one with --map {role}=COLUMN, or none with --map {role}=none",
+            remedy=f"choose one with {name_columns(**{role: 'COLUMN'})}, or none with {name_columns(**{role: 'none'})}",
         )
 
 

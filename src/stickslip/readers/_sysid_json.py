@@ -15,6 +15,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.messages import name_columns
 from stickslip.readers.limits import insist_on_values
 from stickslip.readers.table_columns import Array, Column, Table
 
@@ -72,9 +73,8 @@ def table_of_tests(path: Path, tree: Mapping[str, Any]) -> Table:
     findings.append(Finding("note", "sysid-tests", message))
     if "voltage" not in {channel for _, _, channel in layout}:
         message = "a drivetrain has two sides; positions and velocities of both are in the file"
-        remedy = (
-            "choose one: --map position=left_position --map velocity=left_velocity --map voltage=left_voltage"
-        )
+        left = name_columns(position="left_position", velocity="left_velocity", voltage="left_voltage")
+        remedy = f"choose one: {left}"
         findings.append(Finding("note", "sysid-sides", message, remedy=remedy))
     columns = tuple(
         Column(name, np.ascontiguousarray(rows[:, i]), unit, None, channel)

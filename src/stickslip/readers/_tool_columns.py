@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stickslip.finding import Finding
+from stickslip.messages import name_columns, name_option
 from stickslip.readers.table_columns import Column, Table
 
 
@@ -87,8 +88,8 @@ TOOLS = (
             (
                 f"target_moment{JOINT}",
                 "target_moment is the torque that the controller's model predicts, not a measured one: it is not used",
-                "use actual_current_as_torque (PolyScope 5.23 and later), or actual_current with --torque-constant "
-                "NM_PER_A of the joint (the motor's torque constant x gear ratio)",
+                f"use actual_current_as_torque (PolyScope 5.23 and later), or actual_current with "
+                f"{name_option('torque_constant', 'NM_PER_A')} of the joint (the motor's torque constant x gear ratio)",
             ),
         ),
     ),
@@ -102,8 +103,9 @@ TOOLS = (
                 "a dataset states no units (degrees, radians or percent of a joint's range, by robot and "
                 "calibration), and an action may be a position, a velocity or a difference: none of them is taken as a "
                 "channel",
-                "map one joint with its units, such as --map 'position=observation.state[0]:deg'; for friction the "
-                "dataset needs a torque or a current too, such as --map 'torque=observation.effort[0]:Nm'",
+                f"map one joint with its units, such as {name_columns(position='observation.state[0]:deg')}; "
+                "for friction the "
+                f"dataset needs a torque or a current too, such as {name_columns(torque='observation.effort[0]:Nm')}",
             ),
         ),
         "episode_index",
@@ -119,7 +121,8 @@ TOOLS = (
             (
                 rf"{GROUP}(pos|vel)_estimate",
                 "positions are in revolutions and velocities in revolutions per second, as since firmware 0.5",
-                "if older firmware wrote the file, map them in counts and counts/s, with --counts-per-rev N",
+                "if older firmware wrote the file, map them in counts and counts/s, with "
+                f"{name_option('counts_per_rev', 'N')}",
             ),
         ),
     ),

@@ -14,6 +14,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.messages import name_option
 from stickslip.readers._cells import cell, decoded
 from stickslip.readers.table_columns import Array, Column, Format, Table
 
@@ -126,7 +127,11 @@ def _unit_of_times(constants: dict[str, float | str], blocks: list[_Block]) -> t
     message = f"the trace states no unit of its times: {unit} was assumed"
     if steps:
         message += f", {factor * min(steps):g} s a sample"
-    return factor, [Finding("note", "time-unit", message, remedy="if wrong, give --sample-time SECONDS")]
+    return factor, [
+        Finding(
+            "note", "time-unit", message, remedy=f"if wrong, give {name_option('sample_time', 'SECONDS')}"
+        )
+    ]
 
 
 FORMAT = Format("codesys", "CODESYS trace (CSV)", (".csv", ".txt", ".trace"), recognise, read)

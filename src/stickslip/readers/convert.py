@@ -11,6 +11,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.messages import name_columns, name_option
 from stickslip.readers._choose import Choice
 from stickslip.readers._clock import (
     NoTimes,
@@ -105,7 +106,7 @@ class Drive:
         if self.lead > LONGEST_LEAD:
             raise InputError(
                 f"lead = {self.lead:g} m a revolution is more than any screw, pinion or pulley moves; it is in m "
-                f"({1e-3 * self.lead:g} for {self.lead:g} mm), on the command line (--lead) in mm"
+                f"({1e-3 * self.lead:g} for {self.lead:g} mm), on the command line (`--lead`) in mm"
             )
         if self.side not in ("motor", "load"):
             raise InputError(f"side = {self.side!r} is not known; choose from motor, load")
@@ -240,32 +241,40 @@ def _scale(choice: Choice, unit: Unit, drive: Drive) -> tuple[float, str, list[s
             drive.counts_per_rev,
             choice,
             "counts",
-            "--counts-per-rev",
-            "position=COLUMN:0.25um for a linear scale",
+            name_option("counts_per_rev"),
+            f", or {name_columns(position='COLUMN:0.25um')} for a linear scale",
         )
         factor *= 2.0 * math.pi / per_rev
         kind = "angle" if kind == "counts" else "angular velocity"
         steps.append(f"2π / {per_rev:g} counts")
     elif kind == "electrical speed":
         pairs = _needed(
-            drive.pole_pairs, choice, "electrical revolutions per minute (eRPM)", "--pole-pairs N"
+            drive.pole_pairs,
+            choice,
+            "electrical revolutions per minute (eRPM)",
+            name_option("pole_pairs", "N"),
         )
         factor, kind = factor / pairs, "angular velocity"
         steps.append(f"{pairs:g} pole pairs")
     elif kind == "share" and choice.role in ("motor_torque", "compensation_torque"):
-        rated = _needed(drive.rated_torque, choice, "a share of the rated torque", "--rated-torque")
+        rated = _needed(
+            drive.rated_torque, choice, "a share of the rated torque", name_option("rated_torque")
+        )
         factor, kind = factor * rated, "torque"
         steps.append(f"rated torque {rated:g}")
     elif kind == "share" and choice.role in ("current", "current_reference"):
-        rated = _needed(drive.rated_current, choice, "a share of the rated current", "--rated-current")
+        rated = _needed(
+            drive.rated_current, choice, "a share of the rated current", name_option("rated_current")
+        )
         factor, kind = factor * rated, "current"
         steps.append(f"rated current {rated:g} A")
     side = choice.side or "motor"
     if side != drive.side and choice.role in (*MOTION, *EFFORT) and (choice.side or drive.side == "load"):
         if choice.side == "load" and choice.source in ("map", "profile") and math.isnan(drive.gear_ratio):
             raise InputError(
-                f"{choice.role}: column {choice.column!r} is on the load's side of the gear; give --gear-ratio, "
-                f"or --map {choice.role}={choice.column}@motor if it is not"
+                f"{choice.role}: column {choice.column!r} is on the load's side of the gear; give "
+                f"{name_option('gear_ratio')}, "
+                f"or {name_columns(**{choice.role: f'{choice.column}@motor'})} if it is not"
             )
         if not math.isnan(drive.gear_ratio):
             to_motor = drive.gear_ratio if side == "load" else 1.0 / drive.gear_ratio
@@ -276,8 +285,7 @@ def _scale(choice: Choice, unit: Unit, drive: Drive) -> tuple[float, str, list[s
 
 def _needed(value: float, choice: Choice, what: str, option: str, other: str = "") -> float:
     if math.isnan(value):
-        either = f", or --map {other}" if other else ""
-        raise InputError(f"{choice.role}: column {choice.column!r} is in {what}; give {option}{either}")
+        raise InputError(f"{choice.role}: column {choice.column!r} is in {what}; give {option}{other}")
     return value
 
 
@@ -296,14 +304,16 @@ def _one_kind(
         level = "error" if "motor_torque" in (*turning, *along) else "warning"
         message = f"the record mixes {columns[along[0]]} with {columns[turning[0]]}: lengths and torques"
         remedy = (
-            "give --lead MM, what the axis moves for one revolution (a screw's lead, a pulley's circumference), and "
-            "--gear-ratio N where a gear lies between"
+            f"give {name_option('lead', 'MM')}, what the axis moves for one revolution (a screw's lead, a "
+            "pulley's circumference), and "
+            f"{name_option('gear_ratio', 'N')} where a gear lies between"
         )
         rated = [e for e in listed if e["channel"] == "motor_torque" and _steps_of(e, "rated torque")]
         for entry in rated:
             unit = f"{entry['column']}:{entry['factor']:g}N"
             remedy += (
-                f"; of a linear motor's rated force, instead of --rated-torque, --map 'motor_torque={unit}'"
+                f"; of a linear motor's rated force, instead of {name_option('rated_torque')}, "
+                f"{name_columns(motor_torque=unit)}"
             )
         return [Finding(level, "mixed-units", message, remedy=remedy)]
     # What turns is on the motor's side, unless its gear has been allowed for.
@@ -354,7 +364,8 @@ def _idle_gear(listed: Sequence[dict[str, Any]], drive: Drive) -> list[Finding]:
         return []
     message = f"gear ratio {drive.gear_ratio:g} converts nothing: every signal counts as the motor side's"
     remedy = (
-        "--side load makes a record of the load's side of it, --map position=COLUMN:UNIT@load says what was measured "
+        f"{name_option('side', 'load')} makes a record of the load's side of it, "
+        f"{name_columns(position='COLUMN:UNIT@load')} says what was measured "
         "there"
     )
     return [Finding("note", "gear-ratio", message, remedy=remedy)]
@@ -371,7 +382,10 @@ def pendulum_before_gear(record: Record, told: str) -> list[Finding]:
         f"{told}, but the record is about the motor's side of the gear of {ratio:g}: a pendulum is fitted once a turn "
         "of the motor"
     )
-    remedy = "give --side load, and --map position=COLUMN:UNIT@load for a column that was measured there"
+    remedy = (
+        f"give {name_option('side', 'load')}, and {name_columns(position='COLUMN:UNIT@load')} for a column "
+        "that was measured there"
+    )
     return [Finding("warning", "gear-ratio", message, remedy=remedy)]
 
 
@@ -381,8 +395,9 @@ def _force_from_current(
     """Force = current x force constant, of an axis that moves along a line."""
     if not along:
         raise InputError(
-            f"--force-constant {constant:g} is a linear motor's, and the record's positions are angles; give "
-            "--torque-constant NM_PER_A"
+            f"{name_option('force_constant', f'{constant:g}')} is a linear motor's, and the record's positions "
+            "are angles; give "
+            f"{name_option('torque_constant', 'NM_PER_A')}"
         )
     channels["motor_torque"], units["motor_torque"] = constant * channels["current"], SI["force"]
     return {"motor_torque": f"current x force constant {constant:g} N/A"}
@@ -410,12 +425,16 @@ def _torque_from_current(
         factor *= 2.0 * math.pi / way
         constant, gear = f"{drive.torque_constant:g} N·m/A", f" x 2π / {1e3 * way:g} mm"
     elif along:
-        message = f"the axis moves along a line: --torque-constant {drive.torque_constant:g} was taken in N/A"
+        message = (
+            f"the axis moves along a line: {name_option('torque_constant', f'{drive.torque_constant:g}')} "
+            "was taken in N/A"
+        )
         said.append(
             Finding(
                 "warning", "mixed-units", message,
-                remedy="if it is in N·m/A, give the screw's --lead MM; if it is a linear motor's, say so with "
-                "--force-constant N_PER_A in its place",
+                remedy=f"if it is in N·m/A, give the screw's {name_option('lead', 'MM')}; if it is a linear "
+                    "motor's, say so with "
+                f"{name_option('force_constant', 'N_PER_A')} in its place",
             )
         )  # fmt: skip
     channels["motor_torque"] = factor * channels["current"]

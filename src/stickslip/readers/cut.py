@@ -13,6 +13,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.messages import name_columns, name_option
 from stickslip.record import Record, encoder_step
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -51,20 +52,23 @@ class Cut:
     leave_out: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        for option, value in (("--from", self.start), ("--to", self.end)):
+        for name, value in (("start", self.start), ("end", self.end)):
             if math.isnan(value):
-                raise InputError(f"{option} {value} must be a time in s")
+                raise InputError(f"{name_option(name, value)} must be a time in s")
         if not self.start < self.end:
-            raise InputError(f"--from {self.start:g} s must lie before --to {self.end:g} s")
+            raise InputError(
+                f"{name_option('start', f'{self.start:g}')} s must lie before "
+                f"{name_option('end', f'{self.end:g}')} s"
+            )
 
     @property
     def words(self) -> str:
-        """The options that say it."""
+        """References to the options that select the rows."""
         said = {
-            "--from": self.start != -math.inf, "--to": self.end != math.inf,
-            "--rows": self.rows != (1, math.inf), "--leave-out": bool(self.leave_out),
+            "start": self.start != -math.inf, "end": self.end != math.inf,
+            "rows": self.rows != (1, math.inf), "leave_out": bool(self.leave_out),
         }  # fmt: skip
-        return ", ".join(option for option, given in said.items() if given)
+        return ", ".join(name_option(name) for name, given in said.items() if given)
 
 
 def parse_rows(option: str, text: str) -> tuple[float, float]:
@@ -82,7 +86,10 @@ def parse_rows(option: str, text: str) -> tuple[float, float]:
     except ValueError:
         low, high = 0, 0
     if not text.strip(" :") or low < 1 or high < low:
-        raise InputError(f"{option} {text!r} must be rows A:B counted from 1, such as {option} 2001:8000")
+        raise InputError(
+            f"{name_option(option)} {text!r} must be rows A:B counted from 1, such as "
+            f"{name_option(option, '2001:8000')}"
+        )
     return low, high
 
 
@@ -98,12 +105,13 @@ def cut(record: Record, asked: Cut) -> Record:
         return record
     count = len(record)
     number = np.arange(1, count + 1)
-    for option, (low, high) in [("--rows", asked.rows), *(("--leave-out", r) for r in asked.leave_out)]:
+    for option, (low, high) in [("rows", asked.rows), *(("leave_out", r) for r in asked.leave_out)]:
         if low > count:
-            raise InputError(f"{option} begins at row {low:g}, but the record has {count} rows")
+            raise InputError(f"{name_option(option)} begins at row {low:g}, but the record has {count} rows")
         if count < high < math.inf:
             raise InputError(
-                f"{option} ends at row {high:g}, but the record has {count} rows; give {low:g}: for all up to its end"
+                f"{name_option(option)} ends at row {high:g}, but the record has {count} rows; give {low:g}: "
+                "for all up to its end"
             )
     keep = (number >= asked.rows[0]) & (number <= asked.rows[1])
     for low, high in asked.leave_out:
@@ -197,11 +205,14 @@ def unwrapped(record: Record) -> Record:
         Without a position, or where it nowhere jumps.
     """
     if "position" not in record.channels:
-        raise InputError("--unwrap needs a position; say which column it is with --map position=COLUMN")
+        raise InputError(
+            f"{name_option('unwrap', True)} needs a position; say which column it is with "
+            f"{name_columns(position='COLUMN')}"
+        )
     period = _period(record)
     if period == 0.0:
         raise InputError(
-            "--unwrap: the position nowhere jumps by a turn or the range of its counter; leave it out"
+            f"{name_option('unwrap')}: the position nowhere jumps by a turn or the range of its counter; leave it out"
         )
     channels, unit = dict(record.channels), record.units["position"]
     for name in ("position", "position_reference"):

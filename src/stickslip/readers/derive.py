@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError, UnknownName
+from stickslip.messages import name_option
 from stickslip.record import Record
 
 METHODS = ("butterworth", "savitzky-golay")
@@ -95,7 +96,7 @@ def with_position(record: Record) -> Record:
     if not np.isfinite(velocity).all():
         raise InputError(
             "the record has no position, and its velocity has missing values, over which it cannot be integrated; "
-            "leave those rows out (--leave-out A:B), or map the position"
+            f"leave those rows out ({name_option('leave_out', 'A:B')}), or map the position"
         )
     ways = 0.5 * (velocity[1:] + velocity[:-1]) * np.diff(record.time)
     position: Array = np.concatenate([[0.0], np.cumsum(ways)])

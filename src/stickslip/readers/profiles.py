@@ -217,8 +217,8 @@ def save(profile: Profile, table: Table, path: Path | None = None) -> Path:
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise unwritable(target, error, "--profile") from None
-    return write_whole(target, "\n".join(lines) + "\n", "--profile")
+        raise unwritable(target, error, "profile") from None
+    return write_whole(target, "\n".join(lines) + "\n", "profile")
 
 
 def _comment(text: str) -> str:

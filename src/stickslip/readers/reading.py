@@ -274,7 +274,7 @@ def joined(
         named = next((c.column for c in choices if c.role == "time"), "")
         clock, origin = times_of(other, choices, sample_time)
     except InputError as error:
-        raise InputError(f"{source}: {error}") from None
+        raise InputError(f"{source}: {error.message}") from None
     taken = {c.name for c in table.columns}
     columns = [
         replace(

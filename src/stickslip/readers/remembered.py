@@ -17,6 +17,7 @@ from typing import Any
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.messages import name_option, name_options
 from stickslip.readers._choose import Choice, choose, meant, parse_mapping
 from stickslip.readers._units import parse_unit
 from stickslip.readers.convert import EFFORT, MOTION, Drive, is_linear, unit_of
@@ -236,7 +237,7 @@ def _foreign(foreign: Picked) -> list[Finding]:
             f"{listed}: not said for this file, but {_where(origin)}, whose columns have the same names; another axis "
             "has others"
         )
-        open_values = " ".join(f"{_option(n)} {UNITS[n][1]}" for n in names)
+        open_values = name_options(**{n: UNITS[n][1] for n in names})
         remedy = f"give this axis's own with {open_values}, or {options} if these are its own"
         out.append(Finding("warning", "saved-numbers", message, remedy=remedy))
     return out
@@ -258,7 +259,8 @@ def _misfits(foreign: Picked, record: Record) -> list[Finding]:
                 f"{now[key]:.3g}: does {said} hold for this machine?"
             )
             remedy = (
-                f"if not, give {' or '.join(_option(n) for n in brought)}; with --profile FILE.toml a machine has a "
+                f"if not, give {' or '.join(name_option(n) for n in brought)}; with "
+                f"{name_option('profile', 'FILE.toml')} a machine has a "
                 "profile of its own"
             )
             out.append(Finding("warning", "profile-misfit", message, remedy=remedy))
@@ -294,8 +296,4 @@ def _listed(picked: Picked, names: Sequence[str]) -> str:
 
 
 def _options(picked: Picked, names: Sequence[str]) -> str:
-    return " ".join(f"{_option(n)} {_shown(n, picked[n][0])}" for n in names)
-
-
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
+    return name_options(**{n: _shown(n, picked[n][0]) for n in names})

@@ -15,6 +15,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
+from stickslip.messages import name_columns
 from stickslip.readers._packed import Damaged, Member, columns_of, cut_off, dtype_of, members_of
 from stickslip.readers.limits import insist_on_columns
 from stickslip.readers.table_columns import Column, Format, Table
@@ -58,7 +59,7 @@ def read(path: Path) -> Table:
         "a ULog file has the topics of a vehicle, and its torque setpoints are normalised to -1 ... 1: no field is "
         "taken as a channel by its name"
     )
-    remedy = "map the fields of one axis, such as --map velocity=esc_status.esc[0].esc_rpm:rpm"
+    remedy = f"map the fields of one axis, such as {name_columns(velocity='esc_status.esc[0].esc_rpm:rpm')}"
     return Table(
         "ulog", tuple(columns), constants, (Finding("note", "tool", message, remedy=remedy), *findings)
     )

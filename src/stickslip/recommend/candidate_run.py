@@ -20,6 +20,7 @@ from stickslip.errors import ParameterError
 from stickslip.identify.motion import HOLD, Motion, sinusoid
 from stickslip.machines.machine import LONGEST_DELAY, Machine
 from stickslip.machines.rigid import RigidAxis
+from stickslip.messages import render
 from stickslip.recommend.course import Course, course_of
 from stickslip.recommend.following import followed, simulated
 from stickslip.recommend.plant import Plant
@@ -119,6 +120,8 @@ class Drive:
 
     def __post_init__(self) -> None:
         insist_on_own(self, "drive")
+        for name in ("sample_time_from", "encoder_from"):
+            object.__setattr__(self, name, render(getattr(self, name)))
         for name in ("bandwidth", "damping", "sample_time", "torque_limit", "amplitude", "frequency"):
             value = getattr(self, name)
             endless = name == "torque_limit"

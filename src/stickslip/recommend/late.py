@@ -16,6 +16,7 @@ from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.machine import SHORT_DELAY
+from stickslip.messages import name_option
 from stickslip.recommend.candidate_run import Drive
 from stickslip.recommend.plant import Plant
 from stickslip.recommend.sample_time import MIDDLE, WELL_DAMPED
@@ -70,7 +71,7 @@ def refuse_late(found: Identified, drive: Drive, inertia: float) -> None:
     best = fastest(found, drive, inertia)
     rigid = "" if drive.machine else " (of a rigid axis; a belt or a shaft bears less)"
     remedy = (
-        f"give --bandwidth {best:.2g} or less{rigid}"
+        f"give {name_option('bandwidth', f'{best:.2g}')} or less{rigid}"
         if best
         else "no lower bandwidth is well damped on this machine"
     )
@@ -85,7 +86,7 @@ def seconds_meant(drive: Drive) -> Iterator[str]:
     if drive.delay and drive.delay < SHORT_DELAY:
         yield (
             f"The delay of {drive.delay:g} is in samples, so that commands act {drive.delay * drive.sample_time:.3g} s "
-            f"late; if it is in s, give --delay {drive.delay / drive.sample_time:g}."
+            f"late; if it is in s, give {name_option('delay', f'{drive.delay / drive.sample_time:g}')}."
         )
 
 
@@ -98,5 +99,5 @@ def hardly_damped_where_late(found: Identified, drive: Drive, inertia: float) ->
         yield (
             f"With commands {drive.latest:g} samples late this loop is hardly damped while the axis slides (greatest "
             f"sensitivity {peak:.2g}, where {WELL_DAMPED:g} at most is usual): {best:.2g} Hz would be well damped"
-            f"{'' if drive.machine else ' on a rigid axis'} (--bandwidth)."
+            f"{'' if drive.machine else ' on a rigid axis'} ({name_option('bandwidth')})."
         )

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.rigid import RigidAxis
+from stickslip.messages import name_option
 from stickslip.recommend.candidate_run import Drive
 from stickslip.recommend.candidates import Candidate
 from stickslip.recommend.course import measured
@@ -22,8 +23,7 @@ def on_motion(drive: Drive, angle: str) -> Iterator[str]:
         yield (
             "The motion is the measured position, smoothed, since its log has no reference. The drive's own may "
             "differ: where it steps, or asks for more than the axis can follow, an error is left that no compensator "
-            "takes away, and the reduction is smaller than said here. Give the reference with --motion (Python: "
-            "motion=)."
+            f"takes away, and the reduction is smaller than said here. Give the reference with {name_option('motion')}."
         )
     if course.jumps:
         often = f"{len(course.jumps)} times" if len(course.jumps) > 1 else "once"

@@ -12,6 +12,7 @@ from stickslip.identify.identified_file import Identified
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.machines.two_inertias import TwoInertias
+from stickslip.messages import code_of, name_option
 from stickslip.recommend.candidate_run import Drive, Trial, run
 from stickslip.recommend.candidates import Bench, Candidate, resistance
 from stickslip.recommend.recommendation import ALLOWANCE, BETTER, Recommendation
@@ -34,10 +35,10 @@ def sampled_as(drive: Drive, chosen: Candidate | None, linear: bool = False) -> 
     if drive.encoder_from:
         yield f"Simulated with {resolution_words(drive.encoder_counts, linear)}, {drive.encoder_from}."
         yield _reference_velocity(drive)
-    if chosen is None and drive.sample_time_from.startswith(ROWS) and drive.sample_time > USUAL_TIME:
+    if chosen is None and code_of(drive.sample_time_from) == ROWS and drive.sample_time > USUAL_TIME:
         yield (
             "A loop that is sampled more often than its record was kept may bear a compensator where this one does "
-            "not: give its sample time (--sample-time)."
+            f"not: give its sample time ({name_option('sample_time')})."
         )
 
 
@@ -51,8 +52,8 @@ def _reference_velocity(drive: Drive) -> str:
         return "Simulated with a reference velocity of the instant, as given."
     return (
         "Simulated with a reference velocity that is the difference of two reference positions on the best estimate, "
-        "and of either kind on the sampled axes, as it is not stated; give --reference-velocity difference or instant "
-        "(Python: reference_velocity=)."
+        "and of either kind on the sampled axes, as it is not stated; give "
+        f"{name_option('reference_velocity', 'difference')} or instant."
     )
 
 

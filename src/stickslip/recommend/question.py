@@ -9,6 +9,7 @@ from stickslip.errors import InputError
 from stickslip.friction_levels import line_beyond
 from stickslip.identify.identified_file import Identified
 from stickslip.identify.monte_carlo import with_values
+from stickslip.messages import name_file, name_option
 from stickslip.model import Model
 from stickslip.recommend.candidate_run import Drive
 
@@ -24,10 +25,10 @@ def inertia_of(found: Identified, given: float | None) -> float:
     j = given if given is not None else found.axis.get("inertia")
     unit = found.unit("kg·m²")
     if j is None:
-        raise InputError(f"{found.path} holds no inertia; give --inertia in {unit}")
+        raise InputError(f"{name_file(found.path)} holds no inertia; give {name_option('inertia')} in {unit}")
     if not 0.0 < j < math.inf:
         raise InputError(
-            f"inertia = {j:g} {unit} must be greater than 0 and finite; give another one with --inertia"
+            f"inertia = {j:g} {unit} must be greater than 0 and finite; give another one with {name_option('inertia')}"
         )
     return float(j)
 
@@ -44,8 +45,10 @@ def with_motion(found: Identified, drive: Drive) -> Drive:
         return drive
     if found.trajectory is None:
         raise InputError(
-            f"{found.path} holds no motion ([trajectory]): identify the axis again, or give the motion to try a "
-            f"setting along, --motion FILE.csv, or the --amplitude of a slow sinusoid in {found.unit('rad')}"
+            f"{name_file(found.path)} holds no motion ([trajectory]): identify the axis again, or give the "
+            "motion to try a "
+            f"setting along, {name_option('motion', 'FILE.csv')}, or the {name_option('amplitude')} of a slow "
+            f"sinusoid in {found.unit('rad')}"
         )
     return replace(drive, motion=found.trajectory)
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
+from stickslip.messages import Note
 from stickslip.model import Model
 from stickslip.recommend.axes import plants_of
 from stickslip.recommend.beside import Own, belief_of, limit_cycle, tried_beside
@@ -389,7 +390,7 @@ def confirmed(
             unsafe.append(final.setting)
         candidates[best.setting] = replace(
             best,
-            unsafe=tuple(w + where for w in final.unsafe),
+            unsafe=tuple(Note(w + where, w) for w in final.unsafe),
             useless=final.useless,
             refused_as=final.setting,
         )

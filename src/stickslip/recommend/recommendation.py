@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
+from stickslip.messages import render, rendered
 from stickslip.model import Model
 from stickslip.recommend.beside import Beside
 from stickslip.recommend.candidate_run import Drive
@@ -78,6 +79,11 @@ class Recommendation:
     inertia_alone: Candidate | None = None
     friction: Candidate | None = None
     why_none: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "notes", rendered(self.notes))
+        for name in ("rings", "hunts", "why_none"):
+            object.__setattr__(self, name, render(getattr(self, name)))
 
     @property
     def instead(self) -> Beside | None:

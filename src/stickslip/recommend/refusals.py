@@ -10,6 +10,7 @@ from stickslip.analyse.wording import ends
 from stickslip.errors import InputError
 from stickslip.identify.fit.uncertainty import RATIO
 from stickslip.identify.identified_file import Identified
+from stickslip.messages import name_file, name_option
 from stickslip.recommend.candidate_run import Drive, Trial
 from stickslip.recommend.candidates import breakaway, resistance
 
@@ -18,7 +19,8 @@ MOST_STEPS = 1e10
 STEPS_PER_HOUR = 1e9
 """Of a law with memory on one core, about."""
 AT_THE_LOAD = (
-    "; this model, --loop and the limit are in kg and N: 1 N·m of a motor at a lead of P metres is 2 pi / P N"
+    f"; this model, {name_option('loop')} and the limit are in kg and N: 1 N·m of a motor at a lead of P metres "
+    "is 2 pi / P N"
 )
 """Of a torque limit that is too low for a linear axis: it may be the motor's own, in N·m."""
 WITHIN = 5.0
@@ -38,7 +40,8 @@ def refuse_weak(found: Identified, drive: Drive) -> None:
     limit, torque = drive.torque_limit, found.unit("N·m")
     converted = AT_THE_LOAD if torque == "N" else ""
     # A loop of somebody's own may have said it itself.
-    option = "--torque-limit (or limit of --loop)" if drive.gains is not None else "--torque-limit"
+    option = name_option("torque_limit")
+    option += f" (or limit of {name_option('loop')})" if drive.gains is not None else ""
     if limit <= (held := breakaway(found.model)):
         raise InputError(
             f"torque limit {limit:g} {torque}: the drive cannot move the axis, whose friction is {held:.3g} {torque}; "
@@ -47,8 +50,9 @@ def refuse_weak(found: Identified, drive: Drive) -> None:
     if limit <= (friction := resistance(found.model, drive)):
         raise InputError(
             f"torque limit {limit:g} {torque}: the drive cannot follow this motion, along which friction reaches "
-            f"{friction:.3g} {torque}; give a {option} above it, or a slower motion: another --motion, or a "
-            f"smaller --amplitude or --frequency{converted}"
+            f"{friction:.3g} {torque}; give a {option} above it, or a slower motion: another "
+            f"{name_option('motion')}, or a "
+            f"smaller {name_option('amplitude')} or {name_option('frequency')}{converted}"
         )
 
 
@@ -63,7 +67,8 @@ def refuse_unknown(found: Identified) -> None:
     for e in found.estimates:
         if any(math.isnan(x) for x in (e.value, e.lower, e.upper)):
             raise InputError(
-                f"{found.path}: the estimate of {e.name} is {e.value:g} [{e.lower:g}, {e.upper:g}], from which no axis "
+                f"{name_file(found.path)}: the estimate of {e.name} is {e.value:g} [{e.lower:g}, {e.upper:g}], "
+                "from which no axis "
                 "can be sampled; identify the axis again"
             )
     levels = [e for e in found.law_estimates[0] if e.unit in ("N·m", "N")]
@@ -73,7 +78,8 @@ def refuse_unknown(found: Identified) -> None:
         )
         why = next((f": {e.verdict}" for e in levels if e.verdict), "")
         raise InputError(
-            f"{found.path}: the record does not determine the friction level ({listed} {levels[0].unit}, not "
+            f"{name_file(found.path)}: the record does not determine the friction level ({listed} "
+            f"{levels[0].unit}, not "
             f"identified{why}); identify a record with constant speeds, three of them at least, each in both directions"
         )
 
@@ -88,8 +94,10 @@ def refuse_loaded(found: Identified) -> None:
     grows = [name for name in ("load_motor", "load_external") if found.axis.get(name)]
     if grows:
         raise InputError(
-            f"{found.path}: its friction is that of an unloaded axis and grows with the load ({', '.join(grows)}), "
-            "which no compensator that is tried here has; identify without --load, for the friction at the loads of "
+            f"{name_file(found.path)}: its friction is that of an unloaded axis and grows with the load "
+            f"({', '.join(grows)}), "
+            f"which no compensator that is tried here has; identify without {name_option('load', True)}, for "
+            "the friction at the loads of "
             "the record"
         )
 
@@ -110,7 +118,7 @@ def held(found: Identified, alone: Trial | str, drive: Drive, inertia: float | N
             return alone
         alone = f"RMS error {error:.3g} {found.unit('rad')} along a motion of {size:.3g}"
     raise InputError(
-        f"on the axis of {found.path} the linear loop alone is unstable: {alone}; "
+        f"on the axis of {name_file(found.path)} the linear loop alone is unstable: {alone}; "
         + (unsure_inertia(found) if inertia is None else "")
         + "check its gains, or identify a record with faster motion"
     )
@@ -121,7 +129,7 @@ def unsure_inertia(found: Identified) -> str:
     said, unit = inertia_said(found), found.unit("kg·m²")
     if not said:
         return ""
-    own = f"give that with --inertia in {unit} (Python: inertia=)"
+    own = f"give that with {name_option('inertia')} in {unit}"
     return f"{said}, and the loop may be stable on the axis's own: {own}, "
 
 

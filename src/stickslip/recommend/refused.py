@@ -11,23 +11,28 @@ from collections.abc import Sequence
 
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.rigid import RigidAxis
+from stickslip.messages import code_of, name_option
 from stickslip.recommend.candidate_run import AT_REST, IN_MOTION, LARGER, LEFT, ROUGH_MOTION
 from stickslip.recommend.candidates import AFTER_A_PUSH, WORTH, Bench, Candidate, Setting
 from stickslip.recommend.long_rest import HUNTS
 from stickslip.recommend.recommendation import ALLOWANCE
 from stickslip.recommend.separation import separate
 
-CALMER = "lower the gains of the loop (--bandwidth, --loop), shorten its sample time, or use a finer encoder"
+CALMER = (
+    f"lower the gains of the loop ({name_option('bandwidth')}, {name_option('loop')}), shorten its sample "
+    "time, or use a finer encoder"
+)
 REMEDIES = {
     AT_REST: CALMER, AFTER_A_PUSH: CALMER, IN_MOTION: CALMER, ROUGH_MOTION: CALMER,
-    LARGER: "leave compensation off for this loop and motion, or give the motion that matters (--motion)",
+    LARGER: "leave compensation off for this loop and motion, or give the motion that matters "
+        f"({name_option('motion')})",
     HUNTS: "lower the integral gain, or hold the integral while the error is small",
-    LEFT: "check the gains of the loop and the inertia (--inertia)",
+    LEFT: f"check the gains of the loop and the inertia ({name_option('inertia')})",
 }  # fmt: skip
 """Remedy, by reason."""
 NOT_FRICTION = (
     "most of the error left is not caused by the friction of the model; leave compensation off, or give the motion "
-    "that matters (--motion)"
+    f"that matters ({name_option('motion')})"
 )
 NARROWER = "identify a record that narrows the intervals of the model (measure_next in its file)"
 
@@ -88,7 +93,7 @@ def on_every_axis(
 
 def remedy_of(reason: str) -> str:
     """Return what to do about a reason."""
-    return next((remedy for start, remedy in REMEDIES.items() if start in reason), NOT_FRICTION)
+    return REMEDIES.get(code_of(reason) or reason, NOT_FRICTION)
 
 
 def _bad(error: float, unsafe: Sequence[str]) -> bool:

@@ -7,9 +7,10 @@ import math
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.machine import Machine
+from stickslip.messages import name_option
 from stickslip.record import counts_of_step
 
-OWN = "give --counts-per-rev (Python: counts_per_rev=)"
+OWN = f"give {name_option('counts_per_rev')}"
 
 
 def encoder_for(
@@ -36,7 +37,8 @@ def encoder_for(
     if given is not None:
         if not (given == 0.0 or 1.0 <= given < math.inf):
             raise InputError(
-                f"--counts-per-rev {given:g} must be at least 1 and finite, or 0 for exact positions; leave it out to "
+                f"{name_option('counts_per_rev', f'{given:g}')} must be at least 1 and finite, or 0 for exact "
+                "positions; leave it out to "
                 "take the resolution of the record"
             )
         return given, "as given"

@@ -13,6 +13,7 @@ import numpy as np
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
 from stickslip.machines.rigid import RigidAxis
+from stickslip.messages import name_option
 from stickslip.recommend.candidate_run import Drive, Trial, held_between_counts, rings, run
 from stickslip.recommend.swings import between_counts
 
@@ -62,6 +63,8 @@ def hunting(gains: Gains | Cascade, given: bool) -> str:
 def against_friction(gains: Gains | Cascade, given: bool) -> str:
     """Cause and remedy of an integral part that hunts against friction."""
     name, value = integral_of(gains)
-    less = f"lower {name} ({value:.4g})" if given else "take a loop without it (--linear PD)"
+    less = (
+        f"lower {name} ({value:.4g})" if given else f"take a loop without it ({name_option('linear', 'PD')})"
+    )
     held = "hold the integral while the error is small"
     return f"the integral part hunts against the friction at rest; {less}, or {held}"

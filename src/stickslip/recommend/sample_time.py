@@ -18,6 +18,7 @@ from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.drivetrain import Drivetrain
 from stickslip.machines.machine import Machine
+from stickslip.messages import Note, name_option
 from stickslip.recommend.candidate_run import Drive
 
 WELL_DAMPED = 2.0
@@ -25,8 +26,9 @@ WELL_DAMPED = 2.0
 MIDDLE = 10.0
 """Hz; a linear loop is the same at every frequency."""
 
-ROWS = "the time between the rows of"
-OWN = "where the drive's is another one, give --sample-time (Python: sample_time=)"
+ROWS = "rows"
+"""Code of the sample time that is the time between the rows of a record."""
+OWN = f"where the drive's is another one, give {name_option('sample_time')}"
 
 
 def sample_time_for(
@@ -67,7 +69,7 @@ def sample_time_for(
             f"assumed: sampled every {period:.3g} s, as {record} has rows, this loop would be unstable or hardly "
             f"damped, so that it is taken to run faster than the record was kept; {OWN}"
         )
-    return period, f"{ROWS} {record}; {OWN}"
+    return period, Note(f"the time between the rows of {record}; {OWN}", ROWS)
 
 
 def below_half_the_rate(corner: float, period: float) -> bool:
@@ -85,8 +87,9 @@ def refuse_filter(drive: Drive) -> None:
     corner, period = drive.velocity_filter, drive.sample_time
     if not below_half_the_rate(corner, period):
         raise InputError(
-            f"--loop: filter = {corner:g} Hz must lie below half the sample rate, {0.5 / period:g} Hz at a sample time "
-            f"of {period:g} s; give a lower corner, or the drive's --sample-time"
+            f"{name_option('loop')}: filter = {corner:g} Hz must lie below half the sample rate, "
+            f"{0.5 / period:g} Hz at a sample time "
+            f"of {period:g} s; give a lower corner, or the drive's {name_option('sample_time')}"
         )
 
 

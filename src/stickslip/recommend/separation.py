@@ -20,6 +20,7 @@ from stickslip.identify.identified_file import Identified
 from stickslip.identify.needed_motions import motion_for
 from stickslip.machines.rigid import RigidAxis
 from stickslip.machines.two_mass import TwoMassAxis
+from stickslip.messages import name_option
 from stickslip.recommend.plant import Plant
 
 LEVEL = 0.05
@@ -82,8 +83,8 @@ class Separation:
             return self.attribute.remedy
         good = "instant" if self.above else "difference"
         return (
-            f"if your drive forms it {self._formed(not self.above)}, state --reference-velocity {good} (Python: "
-            f"reference_velocity={good!r}); else set the drive to it"
+            f"if your drive forms it {self._formed(not self.above)}, state {name_option('reference_velocity', good)}; "
+            "else set the drive to it"
         )
 
     def _formed(self, difference: bool) -> str:
@@ -103,7 +104,7 @@ def attributes_of(found: Identified) -> Callable[[Plant], dict[str, tuple[Attrib
     """Return the function that gives the attributes of a sampled axis of this model, with their values."""
     torque, angle = found.unit("N·m"), found.unit("rad")
     units = {e.name: e.unit for e in found.estimates}
-    resonance = "record faster motion, or give the machine with --machine"
+    resonance = f"record faster motion, or give the machine with {name_option('machine')}"
 
     def named(name: str) -> Attribute:
         return Attribute(name, units.get(name, ""), f"record {motion_for(name)}, which determines {name}")
@@ -113,14 +114,14 @@ def attributes_of(found: Identified) -> Callable[[Plant], dict[str, tuple[Attrib
         out = {name: (named(name), value) for name, value in plant.sampled.items()}
         further = [
             ("inertia", found.unit("kg·m²"), plant.inertia,
-             "give the axis's own with --inertia (Python: inertia=), or identify a record with stronger accelerations"),
-            ("delay", "samples", plant.delay, "give the drive's command delay with --delay (Python: delay=)"),
+             f"give the axis's own with {name_option('inertia')}, or identify a record with stronger accelerations"),
+            ("delay", "samples", plant.delay, f"give the drive's command delay with {name_option('delay')}"),
             ("current loop bandwidth", "Hz", plant.bandwidth,
-             "describe the drive with --machine, whose amplifier has the bandwidth"),
+             f"describe the drive with {name_option('machine')}, whose amplifier has the bandwidth"),
             (REFERENCE_VELOCITY, "", float(plant.backward),
              ""),
             ("torque over the position", f"{torque} RMS", plant.unmodelled,
-             "identify and compensate the torque over the position first (stickslip identify --position-map)"),
+             "identify and compensate the torque over the position first (`stickslip identify --position`)"),
         ]  # fmt: skip
         if plant.friction.law.steady and math.isfinite(level := static_level(plant.friction)):
             further.append(("friction at rest", torque, level, f"record {motion_for('fs')}"))

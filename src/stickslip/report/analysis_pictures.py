@@ -43,7 +43,7 @@ SPLITS = {"the rest at the motor": 0.001, "the rest in the middle": 0.999}
 def draw_analysis(picture: Drawn, path: Path) -> None:
     """Save a picture to a path that ends in .svg, .png or .pdf."""
     title, message, panels, height = picture
-    save([path], title, message, panels, height, option="--plot")
+    save([path], title, message, panels, height, option="plot")
 
 
 def picture_of_spectra(found: Sequence[Spectrum]) -> Drawn:

@@ -6,7 +6,6 @@ The head of the report and what `stickslip identify` prints are made of these se
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identification.notes import CONTRADICTED, drift_of, on_timing
+from stickslip.identification.notes import CONTRADICTED, TIMING_CONTRADICTED, drift_of, on_timing
 from stickslip.identification.sliding import SlidingPosterior
 from stickslip.identify.axis.loop_check import OTHER_LOOP
 from stickslip.identify.axis.problem import mechanics_parameters
@@ -24,6 +23,7 @@ from stickslip.identify.monte_carlo import resisting_torque
 from stickslip.identify.motion import speeds_of
 from stickslip.identify.regression.inverse import InverseDynamics
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import code_of, name_option, render, rendered
 from stickslip.record import Record
 from stickslip.report.next_steps import Step, next_steps
 from stickslip.report.plots import quantity
@@ -40,8 +40,6 @@ AMPLITUDE = 0.02
 """Part of friction's level that a torque over the position must be for it to be told. What the form of a law leaves
 repeats with the motion, and so over the position: of 43 orders that no machine had, found beside whole turns in 144
 logs with cogging (`benchmarks/ordinary_logs.py`), 39 were smaller, and none of 256 that were there."""
-OF_ONE = re.compile(r"\b(determines?|distinguish) it\b")
-"""How a verdict speaks of its number."""
 OWN_WORDS = {
     "fc": "Coulomb torque", "fs": "static (break-away) torque", "fs_positive": "break-away torque, v > 0",
     "stiffness": "stiffness at rest", "fs_negative": "break-away torque, v < 0",
@@ -77,6 +75,11 @@ class Answers:
     told: tuple[str, ...]
     doubts: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "trust", render(self.trust))
+        for name in ("friction", "evidence", "told", "doubts"):
+            object.__setattr__(self, name, rendered(getattr(self, name)))
+
     def as_dict(self) -> dict[str, Any]:
         """Trust, doubts and evidence as plain data for JSON and TOML."""
         return {"trust": self.trust, "doubts": list(self.doubts), "evidence": list(self.evidence)}
@@ -99,7 +102,7 @@ def answers_of(
     """
     sliding = sliding_of(found)
     timing = [s for s in timing_of(found) if s in found.notes]
-    missing = tuple(s for s in found.notes if s.startswith("Not identified: "))
+    missing = tuple(s for s in found.notes if code_of(s) == "not-identified")
     reasons = tuple(doubts(found, sliding))
     return Answers(
         tuple(friction_in(found, records)), trusted(found, reasons), (*evidence(found, sliding), *timing),
@@ -180,14 +183,9 @@ def one_number_each(estimates: Iterable[Estimate]) -> list[str]:
         if not e.identified:
             reasons.setdefault(e.verdict, []).append(e.name)
     return [
-        f"{', '.join(names)} not identified: {of_several(why, names)}"
-        for why, names in ((why or "the data do not determine it", names) for why, names in reasons.items())
+        f"{', '.join(names)} not identified: {why or 'not determined by the data'}"
+        for why, names in reasons.items()
     ]
-
-
-def of_several(why: str, names: Sequence[str]) -> str:
-    """A verdict on one number, said of all of these."""
-    return why if len(names) == 1 else OF_ONE.sub(r"\1 them", why)
 
 
 # ---- can I trust it -------------------------------------------------------------------------------------------------
@@ -225,7 +223,10 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
             f"{mostly_waves(found, sliding)}"
         )
     if sliding is not None and beaten(sliding):
-        better = f"plain least squares (--inverse) explains the {effort} better where the axis slides"
+        better = (
+            f"plain least squares ({name_option('inverse', True)}) explains the {effort} better where the "
+            "axis slides"
+        )
         out.append(f"{better}{beside_held_inertia(found, unit_in(found, 'kg·m²'))}")
     fall = missing_fall(found.misfit)
     if fall > 0.0 and found.model is not None:
@@ -239,17 +240,19 @@ def doubts(found: Identification, sliding: Sliding | None) -> list[str]:
     held, own = (found.misfit.get(f"{p}force_relative", math.nan) for p in ("held_out_", ""))
     if held > ELSEWHERE * own:
         out.append(f"on records held out its force error is {percent(held)}, {percent(own)} on those fitted")
-    if any(OTHER_LOOP in note for note in found.notes):
+    known = {code_of(note) for note in found.notes}
+    if OTHER_LOOP in known:
         out.append("the record shows another controller than the loop given")
-    if any(note.startswith(CONTRADICTED) for note in found.notes):
-        out.append(f"{CONTRADICTED[0].lower()}{CONTRADICTED[1:]}")
+    if TIMING_CONTRADICTED in known:
+        out.append(f"the {CONTRADICTED}")
     warned = [f for f in found.findings if getattr(f, "level", "") == "warning"]
     posterior = found.details.get("sliding")
     if isinstance(posterior, SlidingPosterior) and not any(f.code == "change" for f in warned):
         drift = drift_of(posterior)
         if drift is not None and abs(drift.share) >= DRIFTS_BY:
             out.append(
-                f"friction {drift} over the record: warm the axis up first, or cut with --from and --to"
+                f"friction {drift} over the record: warm the axis up first, or cut with {name_option('start')} "
+                f"and {name_option('end')}"
             )
     # Whose numbers they are is for the reader to say: each is named here.
     out += dict.fromkeys(f.message for f in warned if f.code == "saved-numbers")
@@ -339,7 +342,7 @@ def either_way(found: Identification) -> list[str]:
         return []
     return [
         f"The constant torque may as well be friction that is {percent(2.0 * abs(offset.value) / level)} of its level "
-        "greater in one direction; --per-direction gives each its own."
+        f"greater in one direction; {name_option('per_direction', True)} gives each its own."
     ]
 
 

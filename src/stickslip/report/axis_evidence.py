@@ -15,6 +15,7 @@ from stickslip.identify.estimate import Identification
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.noise import white_std
 from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.messages import Note, code_of, name_option, render
 from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
@@ -27,6 +28,8 @@ ACCELERATING, STEADY = 0.3, 0.1
 WINDOW, STEPS, SLOWER = 15, 12, 0.3
 """Part of a record that is shown close up is one over it; steps of the encoder that it moves there at least, and what
 part of the usual way at most."""
+GOOD_CODE = "good"
+"""Code of a judgement that a misfit is explained by noise."""
 GOOD = 3.0
 """Times the noise, up to which a misfit is called good."""
 
@@ -125,8 +128,9 @@ def judgements(found: Identification) -> dict[str, str]:
             rms = float(found.misfit.get(f"{signal}_rms", math.nan))
             out[f"{signal}_relative"] = beside(rms, level, what.get(signal, "the noise of the signal"))
         told = out["position_relative"]
-        if told and not told.startswith("good") and not all(t.closed_loop for t in experiments):
-            out["position_relative"] = f"{told}: the recorded torque alone lets it drift (--loop holds it)"
+        if told and code_of(told) != GOOD_CODE and not all(t.closed_loop for t in experiments):
+            drifts = f"the recorded torque alone lets it drift ({name_option('loop')} holds it)"
+            out["position_relative"] = render(f"{told}: {drifts}")
         if inverse is not None:
             # Its filters round every reversal: even the true axis leaves some per cent.
             out["inverse_dynamics_relative"] = "a first look, from which the search starts"
@@ -138,7 +142,7 @@ def beside(rms: float, level: float, what: str) -> str:
     if not (rms >= 0.0 and level > 1e-6 * rms):
         return ""
     times = rms / level
-    return f"good: at {what}" if times <= GOOD else f"{float(f'{times:.2g}'):g} times {what}"
+    return Note(f"good: at {what}", GOOD_CODE) if times <= GOOD else f"{float(f'{times:.2g}'):g} times {what}"
 
 
 def has_encoder(experiments: Sequence[Experiment]) -> bool:

@@ -35,7 +35,7 @@ def draw_picture_to(picture: Picture, target: Path) -> Path:
     InputError
         If the file cannot be written.
     """
-    plots.save([target], picture.title, picture.message, [panel_of(picture)], HEIGHT, option="--plot")
+    plots.save([target], picture.title, picture.message, [panel_of(picture)], HEIGHT, option="plot")
     return target
 
 

@@ -14,9 +14,10 @@ from stickslip.analyse.wording import ends
 from stickslip.finding import Finding
 from stickslip.identify.axis.search import FittedAxis
 from stickslip.identify.estimate import Estimate, Held, Identification, Picture
+from stickslip.messages import code_of
 from stickslip.record import Record
 from stickslip.report.answers import answers_of, meaning_of, one_number_each, speeds_in
-from stickslip.report.axis_evidence import judgements
+from stickslip.report.axis_evidence import GOOD_CODE, judgements
 from stickslip.report.axis_pictures import data_pictures, pictures_of
 from stickslip.report.identification import HEIGHT, panel_of
 from stickslip.report.page import filled
@@ -208,7 +209,7 @@ def tally(found: Identification, sources: Sequence[Source]) -> list[dict[str, An
         if name in found.misfit and not open_loop(found):
             told = judged.get(name, "")
             count = f"{100.0 * float(found.misfit[name]):.3g} %"
-            out.append({"count": count, "words": words, "judged": told, "good": told.startswith("good")})
+            out.append({"count": count, "words": words, "judged": told, "good": code_of(told) == GOOD_CODE})
     return out
 
 

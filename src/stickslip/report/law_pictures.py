@@ -175,7 +175,7 @@ def draw_law(model: Model, *targets: Path) -> None:
         _steps_panel(model, velocity_steps(model, scales), (word, torque), f"{length}/s"),
     ]
     title = model.law.title + (f", {chosen}" if chosen else "")
-    save(targets, title, _described(model), panels, 2.0, option="--plot")
+    save(targets, title, _described(model), panels, 2.0, option="plot")
 
 
 def draw_gallery(models: Sequence[Model], path: Path) -> None:
@@ -207,7 +207,7 @@ def draw_gallery(models: Sequence[Model], path: Path) -> None:
             )
         # No date in the file: the same laws give the same bytes.
         undated = {"metadata": {DATES[path.suffix]: None}} if path.suffix in DATES else {}
-        with draft_of(path, "--plot") as draft:
+        with draft_of(path, "plot") as draft:
             figure.savefig(draft, format=path.suffix[1:], dpi=DPI, **undated)
 
 

@@ -15,6 +15,7 @@ from stickslip.identification.sliding import SlidingPosterior
 from stickslip.identify.estimate import Identification
 from stickslip.identify.needed_motions import MOTIONS, experiment_for
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import name_option, render
 from stickslip.record import SAME_COUNTS, Record, counts_of_step, encoder_step, row_period
 from stickslip.report.after_a_map import after_a_map
 from stickslip.report.sliding_torque import beaten, sliding_of
@@ -41,6 +42,9 @@ class Step:
     command: str = ""
     python: str = ""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "what", render(self.what))
+
 
 def next_steps(
     found: Identification, records: Sequence[Record], model_file: str | Path, files: Sequence[str]
@@ -54,14 +58,15 @@ def weighed(found: Identification, files: Sequence[str], model_file: str) -> lis
     axis = found.details.get("axis")
     if not isinstance(axis, ServoAxis) or axis.gravity == "pendulum" or found.method == "cogging":
         return []
-    told = any(f.code == "gravity" and "--pendulum" in f.remedy for f in found.findings)
+    told = any(f.code == "gravity" for f in found.findings)
     sliding = found.details.get("sliding")
     if not told and isinstance(sliding, SlidingPosterior) and axis.motion != "linear":
         told = any(abs(order - 1.0) < 1e-3 and x > HEAVY * sliding.friction for order, x in sliding.waves)
     if not told:
         return []
     said = (
-        "The torque depends on the angle as gravity does: identify with --pendulum, or turn the axis upright"
+        "The torque depends on the angle as gravity does: identify with "
+        f"{name_option('pendulum', True)}, or turn the axis upright"
     )
     again = f"stickslip identify {quoted(files)} --pendulum --out {shlex.quote(model_file)}{OPTIONS}"
     call = "found = ss.identify(..., pendulum=True)  # gravity shows over the angle; with the arguments of this run"
@@ -114,12 +119,13 @@ def forward(found: Identification, records: Sequence[Record], model_file: str) -
                  'ss.export(found, to="c99", folder="c")')
         ]  # fmt: skip
     setting, drive = shlex.quote(str(Path(model_file).with_name("recommended.toml"))), drive_in(records)
+    instead = "in place of these" if "sample_time" in drive else f"({name_option('sample_time')}) besides"
     options = " ".join(f"--{name.replace('_', '-')} {value}" for name, value in drive.items())
     arguments = ", ".join(f"{n}={x!r}" if n == "loop" else f"{n}={x}" for n, x in drive.items())
     return [
         Step(
             "Find the compensator that is safe to switch on, with your drive's loop and sample time "
-            f"{'in place of these' if 'sample_time' in drive else '(--sample-time) besides'}"
+            f"{instead}"
             f"{', counts being those of 2π m' if is_linear(records) and 'counts_per_rev' in drive else ''}:",
             f"stickslip recommend {model} {options} --out {setting}",
             f"advice = ss.recommend(found, {arguments})",

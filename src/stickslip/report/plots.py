@@ -167,7 +167,7 @@ def draw(path: Path, title: str, message: str, panels: Sequence[Panel], height: 
 
 def save(
     targets: Sequence[Path], title: str, message: str, panels: Sequence[Panel], height: float = 2.0,
-    option: str = "--out",
+    option: str = "folder",
 ) -> None:  # fmt: skip
     """Draw panels as `draw` does and save them in the formats that the suffixes name.
 

@@ -6,7 +6,6 @@ import math
 
 from stickslip.analyse.wording import ends
 from stickslip.identify.estimate import Estimate, Identification
-from stickslip.in_python import in_python
 from stickslip.report.answers import Answers, meaning_of, one_number_each
 from stickslip.report.next_steps import BY_A_RIG, Step
 
@@ -33,7 +32,7 @@ def measured(step: Step) -> str:
 def result_lines_in_python(found: Identification, answers: Answers) -> list[str]:
     """The same, what to do now in Python where it can be done there."""
     steps = [f"next: {s.python}" if s.python else step_in_python(s) for s in answers.steps]
-    return [*(in_python(line, "identify") for line in numbers_and_trust(found, answers)), *steps]
+    return [*numbers_and_trust(found, answers), *steps]
 
 
 def step_in_python(step: Step) -> str:
@@ -41,7 +40,7 @@ def step_in_python(step: Step) -> str:
     if not measured(step):
         return f"next, in a shell: {step.command}"
     command = f"`{step.command}` in a shell" if step.command else ""
-    return in_python(f"measure next: {step.what} {command}".rstrip(), "identify")
+    return f"measure next: {step.what} {command}".rstrip()
 
 
 def numbers_and_trust(found: Identification, answers: Answers) -> list[str]:

@@ -24,6 +24,7 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError, MessageLost, Overrun, RigError
+from stickslip.messages import name_option
 from stickslip.record import Record
 from stickslip.rigs.budget import BUDGET, Budget, Watch
 from stickslip.rigs.declared import FIELDS, answer, blamed, checked, last_resort
@@ -94,7 +95,7 @@ class Loop:
         if rig.capabilities.watchdog is None and not without_watchdog:
             raise InputError(
                 f"{rig.name}: no watchdog is declared, so nothing takes its torque away if this process dies; "
-                "give it one, or arm it with --no-watchdog (without_watchdog=True)"
+                f"give it one, or arm it with {name_option('without_watchdog', True)}"
             )
         if not budget > 0.0:
             raise InputError(f"budget = {budget:g} s must be greater than 0")

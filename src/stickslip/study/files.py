@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.messages import ask_for_place
 from stickslip.record import Record
 from stickslip.study.provenance import engine_hash, file_hash, versions
 from stickslip.study.result import Run
@@ -57,13 +58,11 @@ def claim_folder(folder: Path, name: str, kind: str = "study") -> Path:
         for place in (found for pattern in PLACES for found in folder.glob(pattern)):
             if place.is_file() or any(_inside(place)):
                 raise InputError(
-                    f"{folder} holds {place.name} already, which no {kind} of stickslip wrote; choose another place "
-                    "with --out, or move it away"
+                    f"{folder} holds {place.name} already, which no {kind} of stickslip wrote; "
+                    f"{ask_for_place()}, or move it away"
                 )
     elif found != (kind, name):
-        raise InputError(
-            f"{folder} holds the {found[0]} {found[1]!r}; choose another place with --out, or delete it"
-        )
+        raise InputError(f"{folder} holds the {found[0]} {found[1]!r}; {ask_for_place()}, or delete it")
     prepared_folder(folder)
     write_whole(folder / MARK, json.dumps({kind: name}))
     return folder

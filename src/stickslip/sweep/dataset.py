@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError, unwritable
+from stickslip.messages import ask_for_place
 from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.block import Block
 from stickslip.sweep.plan import Sweep
@@ -126,7 +127,7 @@ def refuse_strays(folder: Path, sweep: Sweep) -> None:
         raise InputError(
             f"{folder} holds finished blocks of another sweep ({len(strays)}, such as "
             f"{strays[0].relative_to(folder)}): its cases, ranges, metrics, runs or numerics were others, or another "
-            "version of stickslip wrote them; run that one to go on, choose another place with --out, or delete it"
+            f"version of stickslip wrote them; run that one to go on, {ask_for_place()}, or delete it"
         )
 
 
@@ -149,7 +150,7 @@ def room_for(folder: Path, sweep: Sweep) -> None:
     if wanted > free:
         raise InputError(
             f"{sweep.cases} cases take about {wanted / 1e9:.3g} GB and {place} has {free / 1e9:.3g} GB free; "
-            "run fewer, or choose another place with --out"
+            f"run fewer, or {ask_for_place()}"
         )
 
 

@@ -21,6 +21,7 @@ from typing import Any
 from stickslip.capacity import insist_on_jobs, insist_on_memory
 from stickslip.errors import InputError
 from stickslip.identify.estimate import silent
+from stickslip.messages import name_option
 from stickslip.study.files import claim_folder, save_manifest
 from stickslip.study.study import interrupts_between_runs
 from stickslip.sweep import dataset
@@ -142,7 +143,7 @@ def ready(sweep: Sweep, scheduler: str = "") -> None:
     """
     if scheduler and not ADDRESS.fullmatch(scheduler):
         raise InputError(
-            f"--scheduler {scheduler!r} is no address of a Dask scheduler; give one such as tcp://host:8786"
+            f"{name_option('scheduler', f'{scheduler!r}')} is no address of a Dask scheduler; give one such as tcp://host:8786"
         )
     loops = len(sweep.runs) * sweep.drawn.cases
     insist_on_memory(loops / BLOCK * BOOKED, f"{loops:.3g} closed loops in blocks of {BLOCK}", "run fewer")
@@ -259,7 +260,7 @@ def _cluster(scheduler: str) -> Generator[dict[str, Any]]:
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
-        raise InputError("--scheduler needs Dask; pip install 'stickslip[dask]'") from None
+        raise InputError(f"{name_option('scheduler')} needs Dask; pip install 'stickslip[dask]'") from None
     joblib: Any = importlib.import_module("joblib")
     try:
         client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)

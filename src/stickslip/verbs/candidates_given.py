@@ -11,6 +11,7 @@ from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.errors import InputError, UnknownName
+from stickslip.messages import name_option
 from stickslip.model import Model
 from stickslip.recommend.beside import Own
 from stickslip.recommend.candidate_run import Drive
@@ -32,7 +33,8 @@ def compensators_of(given: Sequence[Given]) -> tuple[Given, ...]:
     names = [name for name in given if isinstance(name, str) and not is_file(name)]
     if "all" in names and len(names) > 1:
         raise InputError(
-            f"--compensators {','.join(names)}: 'all' stands alone; give it without the others, or leave it out"
+            f"{name_option('compensators', ','.join(names))}: 'all' stands alone; give it without the others, "
+            "or leave it out"
         )
     for name in names:
         if name not in (*CATALOGUE, "all"):
@@ -40,7 +42,8 @@ def compensators_of(given: Sequence[Given]) -> tuple[Given, ...]:
     for file in given:
         if is_file(file) and not Path(str(file)).is_file():
             raise InputError(
-                f"--compensators {file}: there is no such file; give a TOML file with a table [controller]"
+                f"{name_option('compensators', file)}: there is no such file; give a TOML file with a table "
+                "[controller]"
             )
     return tuple(each for name in given for each in (CATALOGUE if name == "all" else [name]))
 
@@ -100,12 +103,13 @@ def run_by(drive: Drive, own: Controller, name: str) -> Controller:
     InputError
         If it has another sample time or encoder.
     """
-    for key, option, unit in (("sample_time", "sample-time", " s"), ("encoder_counts", "counts-per-rev", "")):
+    for key, option, unit in (("sample_time", "sample_time", " s"), ("encoder_counts", "counts_per_rev", "")):
         mine, theirs = getattr(own, key), getattr(drive, key)
         if mine not in (0.0, theirs):
             raise InputError(
-                f"--compensators {name}: {key} = {mine:g}{unit} is not the drive's, {theirs:g}{unit}; leave it out "
-                f"there, or give --{option} {mine:g}"
+                f"{name_option('compensators', name)}: {key} = {mine:g}{unit} is not the drive's, "
+                f"{theirs:g}{unit}; leave it out "
+                f"there, or give {name_option(option, f'{mine:g}')}"
             )
     return replace(
         own, sample_time=drive.sample_time, encoder_counts=drive.encoder_counts,

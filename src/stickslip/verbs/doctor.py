@@ -9,7 +9,8 @@ from typing import Unpack
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
-from stickslip.identify.doctor import Diagnosis, examine, findings_in_python
+from stickslip.identify.doctor import Diagnosis, examine
+from stickslip.messages import name_option
 from stickslip.readers.cut import file_rows, pieces, range_words
 from stickslip.verbs.reading import Log, Reading, open_log
 
@@ -46,12 +47,13 @@ def doctor(
         If the log cannot be read at all; what makes it unusable is among the findings.
     """
     if stribeck_velocity is not None and not 0.0 < stribeck_velocity < float("inf"):
-        raise InputError(f"--stribeck-velocity {stribeck_velocity:g} must be greater than 0")
+        raise InputError(
+            f"{name_option('stribeck_velocity', f'{stribeck_velocity:g}')} must be greater than 0"
+        )
     record = open_log(log, reading).record
     parts, short = pieces(record)
     every = [examine(part, stribeck_velocity=stribeck_velocity, accept=accept) for part in parts]
-    findings = findings_in_python(merged(every, short), record)
-    return Diagnosis(findings, every[0].record if len(every) == 1 else record)
+    return Diagnosis(tuple(merged(every, short)), every[0].record if len(every) == 1 else record)
 
 
 def merged(every: Sequence[Diagnosis], more: Sequence[Finding]) -> list[Finding]:

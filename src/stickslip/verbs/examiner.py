@@ -11,7 +11,7 @@ from stickslip.finding import Finding
 from stickslip.identification.memo import EstimateSliding
 from stickslip.identify.doctor import Diagnosis, examine, of_arrays
 from stickslip.identify.doctor.steady_table import is_steady_table
-from stickslip.in_python import in_python
+from stickslip.messages import render
 from stickslip.readers.cut import pieces
 from stickslip.readers.remembered import CODES
 from stickslip.record import Record
@@ -31,7 +31,7 @@ class Examiner:
 
     def say(self, name: str, finding: Finding, record: Record) -> None:
         """Tell a finding of a log, once."""
-        line = f"{name}: {in_python(finding.line(), 'identify', of_arrays(record))}"
+        line = f"{name}: {render(finding.line(), arrays=of_arrays(record))}"
         if line not in self.said:
             self.said.add(line)
             self.tell(line)

@@ -21,10 +21,10 @@ from stickslip.export import CONTROLLER_TARGETS, TARGETS, controller_target, tar
 from stickslip.export.controllers import what_it_is
 from stickslip.export.job import Check, Export, Job
 from stickslip.export.maps import MAP_TARGETS, MapTarget, map_target, written
-from stickslip.export.on_a_line import along_a_line, is_linear, tried
 from stickslip.export.target import Target, settings_of
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.rigid import RigidAxis
+from stickslip.messages import name_option, rendered, units_of_axis
 from stickslip.model import Model
 from stickslip.rules import with_article
 from stickslip.spec import Surroundings
@@ -44,6 +44,10 @@ Source = (
 )  # fmt: skip
 """What can be exported; a path is that of a model.toml, a recommended.toml or a `stickslip simulate` file."""
 
+TURN = "the axis is linear: a turn in these files stands for 2π m"
+STANDS_FOR = "the axis is linear: N·m, rad and kg·m² in these files stand for N, m and kg"
+ROTARY_ONLY = ("bam",)
+"""Targets whose actuators turn: their numbers keep the meaning that the target gives them."""
 Attempt = Callable[[Export], Check]
 """How a target tries files of its own."""
 
@@ -74,6 +78,9 @@ class ExportResult:
     notes: tuple[str, ...] = ()
     check: Check | None = None
     paths: tuple[Path, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "notes", rendered(self.notes))
 
     @arguments_checked
     def save(self, folder: str | os.PathLike[str]) -> ExportResult:
@@ -191,7 +198,7 @@ def export(
         return saved(exported_map(source, to, name or "cogging", settings, asked), folder)
     chosen = target_named(to)
     if single and not chosen.precision:
-        raise InputError(f"--single: {chosen.name} supports only one precision; leave it out")
+        raise InputError(f"{name_option('single')}: {chosen.name} supports only one precision; leave it out")
     options = CompensatorOptions(
         sample_time, substeps, gain, lead, deadband, offset, inertia_feedforward, filter_hz
     )
@@ -207,20 +214,27 @@ def export(
         refuse_missing(source)
     content = content_of(source)
     own, renamed = named(chosen, name, content)
+    linear = content.values.get("motion") == "linear"
     if compensator is None and options.given:
-        option = options.given[0].replace("_", "-")
-        raise InputError(f"--{option} belongs to --compensator; give both or neither")
+        raise InputError(
+            f"{name_option(options.given[0])} belongs to {name_option('compensator')}; give both or neither"
+        )
     if nearest and not chosen.forms:
-        raise InputError(f"--nearest: {chosen.name} carries {chosen.carries}; leave it out")
+        raise InputError(f"{name_option('nearest')}: {chosen.name} carries {chosen.carries}; leave it out")
     if controller or compensator:
         settings_of(chosen, settings or {})
-        result = exported_controller(source, content, chosen, own, options, compensator, single, check)
+        with units_of_axis(linear):
+            result = exported_controller(
+                source, content, chosen, own, options, compensator, single, check, linear
+            )
         return saved(with_notes(result, renamed), folder)
     job = job_of(source, content, own, chosen)
     given = {**job.settings, **(settings or {})}
     top = job.top_speed if top_speed is None else top_speed
     job = replace(job, single=single, nearest=nearest, top_speed=top, settings=given)
-    return saved(with_notes(exported_law(content, job, chosen, check), renamed), folder)
+    with units_of_axis(linear):
+        result = exported_law(content, job, chosen, check)
+    return saved(with_notes(result, renamed), folder)
 
 
 def named(chosen: Target, name: str | None, content: Table) -> tuple[str, tuple[str, ...]]:
@@ -248,7 +262,7 @@ def exported_map(
     """A torque over the angle; `asked` are options that it has none of."""
     for option, given in asked.items():
         if given:
-            raise InputError(f"--{option}: a torque over the angle has none; leave it out")
+            raise InputError(f"{name_option(option)}: a torque over the angle has none; leave it out")
     target = map_target(to)
     made = written(map_in(source, to), target, name, settings)
     return ExportResult(target, name, made.files, (*made.notes, f"tried: {target.tried}"))
@@ -256,7 +270,7 @@ def exported_map(
 
 def exported_controller(
     source: Source, content: Table, chosen: Target, name: str, options: CompensatorOptions,
-    compensator: str | None, single: bool, check: bool,
+    compensator: str | None, single: bool, check: bool, linear: bool,
 ) -> ExportResult:  # fmt: skip
     """The controller of the source, or the compensator asked for on its law."""
     if compensator:
@@ -265,32 +279,35 @@ def exported_controller(
     else:
         made, offset = controller_in(source), 0.0
     target = controller_target(chosen.name)
-    units = {"linear": is_linear(content.values)} if target.declares_units else {}
+    units = {"linear": linear} if target.declares_units else {}
     files: Export = target.write(made, name, single, surroundings_of(source), **units)
-    notes = (*files.notes, *notes_on_controller(content, made, compensator, offset))
+    turns = (TURN,) if linear and not target.declares_units else ()
+    notes = (*files.notes, *notes_on_controller(content, made, compensator, offset), *turns)
     run = target.check if check else None
     attempt: Attempt | None = (lambda made: run(made, name)) if run else None
     titled = replace(chosen, title=target.title.format(what_it_is(made)) or chosen.title)
-    return finished(content, titled, name, replace(files, notes=notes), attempt)
+    return finished(titled, name, replace(files, notes=notes), attempt)
 
 
 def exported_law(content: Table, job: Job, chosen: Target, check: bool) -> ExportResult:
     """The law alone."""
     settings_of(chosen, job.settings)
-    files = chosen.write(job)
-    notes = (*files.notes, *around_of(chosen, job), *notes_on(content, job))
+    rotary = job.linear and chosen.name in ROTARY_ONLY
+    with units_of_axis(job.linear and not rotary):
+        files = chosen.write(job)
+    notes = (
+        *files.notes,
+        *around_of(chosen, job),
+        *notes_on(content, job),
+        *([STANDS_FOR] if rotary else []),
+    )
     attempt = partial(chosen.check, job) if check and chosen.check else None
-    return finished(content, chosen, job.name, replace(files, notes=notes), attempt)
+    return finished(chosen, job.name, replace(files, notes=notes), attempt)
 
 
-def finished(
-    content: Table, chosen: Target, name: str, files: Export, attempt: Attempt | None
-) -> ExportResult:
-    """The export, in the units of a linear axis where the source's is one, and tried where that is asked for."""
-    linear = is_linear(content.values)
-    files = along_a_line(files, chosen.name, name) if linear else files
-    found = attempt(files) if attempt else None
-    return ExportResult(chosen, name, files.files, files.notes, tried(found) if linear else found)
+def finished(chosen: Target, name: str, files: Export, attempt: Attempt | None) -> ExportResult:
+    """Return the export, tried if that is requested."""
+    return ExportResult(chosen, name, files.files, files.notes, attempt(files) if attempt else None)
 
 
 def is_whole(source: Source) -> bool:
@@ -315,10 +332,14 @@ def refuse_controllers(chosen: Target, controller: bool, compensator: str | None
     for option, asked in (("controller", controller), ("compensator", compensator)):
         if asked and chosen.name not in CONTROLLER_TARGETS:
             raise InputError(
-                f"--{option}: {chosen.name} supports the law alone; leave it out, or use --to c99"
+                f"{name_option(option)}: {chosen.name} supports the law alone; leave it out, or use "
+                f"{name_option('to', 'c99')}"
             )
     if controller and compensator:
-        raise InputError("--controller takes the compensator of its file; leave --compensator out")
+        raise InputError(
+            f"{name_option('controller')} takes the compensator of its file; leave "
+            f"{name_option('compensator')} out"
+        )
 
 
 def refuse_missing(source: Source) -> None:
@@ -386,7 +407,7 @@ def job_of(source: Source, content: Table, name: str, chosen: Target) -> Job:
     """The model, with what the file knows of its axis."""
     known = axis_of(content)
     settings: dict[str, str | float] = {s.name: known[s.name] for s in chosen.settings if s.name in known}
-    linear = is_linear(content.values)
+    linear = content.values.get("motion") == "linear"
     if linear and any(s.name == "motion" for s in chosen.settings):
         settings["motion"] = "linear"
     return Job(

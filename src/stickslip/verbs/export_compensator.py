@@ -12,6 +12,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.control.recommended import Recommended, recommended_in
 from stickslip.errors import InputError
+from stickslip.messages import name_option
 from stickslip.model import Model
 from stickslip.verbs.export_notes import axis_of, constant_torque
 
@@ -63,13 +64,15 @@ def recommended_on(content: Table, model: Model, options: CompensatorOptions) ->
     for option in options.given:
         if option in NUMBERS:
             raise InputError(
-                f"--{option.replace('_', '-')} and --compensator recommended, which sets it; leave it out, or give "
-                "--compensator ff or fb"
+                f"{name_option(option)} and {name_option('compensator', 'recommended')}, which sets it; leave "
+                "it out, or give "
+                f"{name_option('compensator')} ff or fb"
             )
     tried, asked = found.sample_time, options.sample_time
     if tried and asked is not None and not math.isclose(tried, asked):
         raise InputError(
-            f"--sample-time {asked:g}: {content.document.name} is recommended for {tried:g} s; leave it out, or "
+            f"{name_option('sample_time', f'{asked:g}')}: {content.document.name} is recommended for {tried:g} "
+            "s; leave it out, or "
             "run `stickslip recommend` with that sample time"
         )
     made = replace(found.on(model), substeps=1 if options.substeps is None else options.substeps)

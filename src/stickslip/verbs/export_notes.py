@@ -14,6 +14,7 @@ from stickslip.export.job import Job
 from stickslip.export.nearest import read_by
 from stickslip.export.target import Target
 from stickslip.machines.angle import AngleMap
+from stickslip.messages import axis_unit, name_option
 
 SLOW = 0.02
 """s: sample times above it are told; a tenth of a period of 5 Hz."""
@@ -56,13 +57,13 @@ def notes_on_controller(
         yield (
             f"a sample time of {time:g} s compensates a reversal up to {time:g} s late, and a loop tolerates it "
             "up to some "
-            f"{0.1 / time:.2g} Hz only; give --sample-time in seconds"
+            f"{0.1 / time:.2g} Hz only; give {name_option('sample_time')} in seconds"
         )
     if compensator == "recommended":
         found = recommended_in(content)
         what = "the loop of" if found.gains else f"a PD of {found.bandwidth:.4g} Hz:"
         gains = ", ".join(f"{k} {v:.5g}" for k, v in found.linear._asdict().items() if v or k == "feed")
-        within = f" and both torques together within ±{found.torque_limit:.5g} N·m"
+        within = f" and both torques together within ±{found.torque_limit:.5g} {axis_unit('N·m')}"
         limit = within if math.isfinite(found.torque_limit) else ""
         yield f"it was tried with {what} {gains}{limit}; the linear controller is not in the export"
         yield from angle_left_out(content)
@@ -89,10 +90,10 @@ def in_words(found: Recommended) -> str:
     """What a file recommends, with its numbers."""
     units = {
         "lead": " s",
-        "deadband": " rad/s",
+        "deadband": f" {axis_unit('rad/s')}",
         "filter": " Hz",
-        "offset": " N·m",
-        "inertia_feedforward": " kg·m²",
+        "offset": f" {axis_unit('N·m')}",
+        "inertia_feedforward": f" {axis_unit('kg·m²')}",
     }
     more = [
         f", {k.replace('_', ' ')} {getattr(found, k):.4g}{u}" for k, u in units.items() if getattr(found, k)
@@ -114,9 +115,11 @@ def other_torques(content: Table, given: float, settings: Mapping[str, object]) 
     known = axis_of(content)
     offset, gravity = constant_torque(content), known.get("gravity", 0.0)
     if offset and offset != given and "offset" not in settings:
-        yield f"the constant torque of {offset:.4g} N·m that acts in addition to friction is not in the export"
+        constant = f"{offset:.4g} {axis_unit('N·m')}"
+        yield f"the constant torque of {constant} that acts in addition to friction is not in the export"
     if gravity and "gravity" not in settings:
         yield (
-            f"gravity, up to {gravity:.4g} N·m over the angle, acts in addition to friction and is not in the "
+            f"gravity, up to {gravity:.4g} {axis_unit('N·m')} over the angle, acts in addition to friction and "
+            "is not in the "
             "export: add gravity sin(q - gravity_angle) of the file's [axis] to the drive's torque"
         )

@@ -20,13 +20,11 @@ from stickslip.config import Table
 from stickslip.errors import InputError
 from stickslip.extras import needed
 from stickslip.finding import Finding
-from stickslip.identify.doctor import findings_in_python
 from stickslip.identify.doctor.steady_table import is_steady_table
 from stickslip.identify.estimate import Estimate, Held, Identification, Picture
 from stickslip.identify.identified_file import Identified, identified_in
 from stickslip.identify.model_file import in_memory, model_content, versions, write_model
 from stickslip.identify.motion import motion_of, speeds_in, speeds_of
-from stickslip.in_python import data_in_python, in_python
 from stickslip.machines.identified import identified_machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.position_map import PositionMap
@@ -136,12 +134,12 @@ class IdentificationResult:
     @property
     def verdict(self) -> str:
         """Whether the numbers can be trusted, in a line."""
-        return in_python(self.answers.trust, "identify")
+        return self.answers.trust
 
     @property
     def evidence(self) -> tuple[str, ...]:
         """Why, a sentence each."""
-        return tuple(in_python(s, "identify") for s in self.answers.evidence)
+        return self.answers.evidence
 
     @property
     def misfit(self) -> Mapping[str, float]:
@@ -151,12 +149,12 @@ class IdentificationResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user must know, one sentence each."""
-        return tuple(in_python(s, "identify") for s in self.identification.notes)
+        return self.identification.notes
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What the doctor found in the logs."""
-        return tuple(f for s in self.sources for f in findings_in_python(s.findings, s.record))
+        return tuple(f for s in self.sources for f in s.findings)
 
     @cached_property
     def answers(self) -> Answers:
@@ -275,7 +273,7 @@ class IdentificationResult:
     def as_dict(self) -> dict[str, Any]:
         """Law, estimates, correlation, misfit and sentences as plain data; ``trust`` is `verdict`, ``doubts`` what it
         names against the numbers (empty where nothing speaks against them), ``evidence`` why."""
-        return data_in_python({**self.identification.as_dict(), **self.answers.as_dict()}, "identify")
+        return {**self.identification.as_dict(), **self.answers.as_dict()}
 
     def to_pandas(self) -> pandas.DataFrame:
         """The parameters as a data frame: value, lower, upper, std, unit, identified, verdict.
@@ -329,7 +327,5 @@ def _given(h: Held) -> tuple[str, ...]:
 
 def _cells(e: Estimate) -> tuple[str, ...]:
     value = "not determined" if e.undetermined or math.isnan(e.value) else f"{e.value:.5g}"
-    verdict = (
-        "identified" if e.identified else f"not identified: {e.verdict or 'the data do not determine it'}"
-    )
+    verdict = "identified" if e.identified else f"not identified: {e.verdict or 'not determined by the data'}"
     return e.name, value, interval_text(e), e.unit, verdict

@@ -27,7 +27,7 @@ from stickslip.identify.experiment import DRIVES
 from stickslip.identify.held import held_in
 from stickslip.identify.methods import method_named, methods_by_option
 from stickslip.identify.methods.method import Method, Options, given_in
-from stickslip.identify.on_a_line import along_a_line, worded
+from stickslip.messages import name_loop, name_option, name_parameter, render, units_of_axis
 from stickslip.model import Model
 from stickslip.readers.convert import pendulum_before_gear
 from stickslip.readers.cut import file_rows
@@ -196,13 +196,15 @@ def identify(
     if method == "axis" and friction_alone(records, options):
         kind = method_named("hysteresis")
         why = "the friction itself is recorded, and no torque of a drive"
-        tell(f"{why}: --method hysteresis is taken, a law along the motion")
+        tell(render(f"{why}: {name_option('method', 'hysteresis')} is taken, a law along the motion"))
         kind.refuse_unused(given, methods_by_option())
     kind.refuse_unknown(options)
     kind.check(records, options)
     examiner.warn(sources)
     progress(f"method {kind.name}, {sum(len(r) for r in records)} samples")
-    found = with_notes(identified(kind, sources, options), kind, records, options, left_out)
+    with units_of_axis(all(is_linear(r) for r in records)):
+        found = identified(kind, sources, options)
+    found = with_notes(found, kind, records, options, left_out)
     found = replace(found, findings=tuple(f for s in sources for f in s.findings))
     return IdentificationResult(found, tuple(sources), law_file(found, () if inverse else laws))
 
@@ -244,7 +246,9 @@ def identified(kind: Method, sources: Sequence[Source], options: Options) -> Ide
         if not spiky:
             raise
         name, message = spiky[0]
-        raise InputError(f"{error}; in {name} {message}: first try --leave-out spikes") from error
+        raise InputError(
+            f"{error.message}; in {name} {message}: first try {name_option('leave_out', 'spikes')}"
+        ) from error
 
 
 def with_pendulum(source: Source) -> list[Finding]:
@@ -258,9 +262,9 @@ def with_notes(
     found: Identification, kind: Method, records: Sequence[Record], options: Options, more: Sequence[str]
 ) -> Identification:
     """What was found in the units of the records, with what a reader must know of it."""
-    if all(is_linear(r) for r in records):
+    if all(is_linear(r) for r in records) and kind.name not in ("axis", "inertia"):
         # Those two know their axis: their numbers have its units.
-        found = worded(found) if kind.name in ("axis", "inertia") else along_a_line(found)
+        found = found.of_linear_axis()
     found = replace(found, estimates=without_inverted_rest(found.estimates))
     said = (
         *assumptions(found, options, kind.name),
@@ -285,7 +289,10 @@ def laws_of(law: str | Law | Sequence[str | Law] | None) -> tuple[tuple[str | La
     names = plugins.law_names()
     tried = [name for name in names if plugins.law(name).steady]
     left_out = ", ".join(name for name in names if name not in tried)
-    said = f"Not among all laws, as they say no torque at constant velocity: {left_out}; name one with --law."
+    said = (
+        f"Not among all laws, as they say no torque at constant velocity: {left_out}; name one with "
+        f"{name_option('law')}."
+    )
     return (*tried, *(x for x in asked if x != "all" and x not in tried)), [said] if left_out else []
 
 
@@ -314,7 +321,7 @@ def sources_of(
         except InputError as error:
             if number < fitted:
                 raise
-            raise InputError(f"--hold-out: {error}") from None
+            raise InputError(f"{name_option('hold_out')}: {error.message}") from None
         every = doctor(opened.record)
         short = Path(name).name if log is not None and name != "the log" else f"log {number + 1}"
         names = [short]
@@ -347,11 +354,12 @@ def loops_of(loop: Loops, count: int) -> list[str]:
     every = [loop] if isinstance(loop, (str, Mapping)) else list(loop)
     if len(every) > 1 and len(every) != count:
         raise InputError(
-            f"--loop is given {len(every)} times for {count} LOGs; give it once, or once for each"
+            f"{name_option('loop')} is given {len(every)} times for {count} LOGs; give it once, or once for each"
         )
     if not all(every):
         raise InputError(
-            f"--loop: {loop!r} names no gain; give them, such as --loop kp=8,kd=0.08, or leave it out"
+            f"{name_option('loop')}: {loop!r} names no gain; give them, such as {name_loop('kp=8,kd=0.08')}, or "
+            "leave it out"
         )
     texts = [loop_text(x) for x in every]
     return texts if len(texts) > 1 else texts * count
@@ -402,8 +410,8 @@ def assumptions(found: Identification, options: Options, method: str) -> list[st
     if not values:
         return []
     listed = ", ".join(f"{name} = {', '.join(f'{x:.4g}' for x in own)}" for name, own in values.items())
-    fit = "; --free NAME fits one" if method == "axis" else ""
-    return [f"Assumed, not fitted: {listed}{fit}, --set NAME=VALUE takes another."]
+    fit = f"; {name_option('free', 'NAME')} fits one" if method == "axis" else ""
+    return [f"Assumed, not fitted: {listed}{fit}, {name_parameter('NAME', 'VALUE')} takes another."]
 
 
 def load_note(records: Sequence[Record], found: Identification) -> list[str]:

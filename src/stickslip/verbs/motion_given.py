@@ -15,7 +15,7 @@ from stickslip.finding import Finding
 from stickslip.identify.doctor import timing, units
 from stickslip.identify.doctor.view import View
 from stickslip.identify.motion import REFERENCES, Motion, motion_of
-from stickslip.in_python import in_python
+from stickslip.messages import name_option, render
 from stickslip.readers import profiles, remembered
 from stickslip.readers.convert import Drive
 from stickslip.readers.derive import positioned
@@ -106,19 +106,15 @@ def motion_in(log: Log, given: Given = Given()) -> tuple[Motion, tuple[str, ...]
         motion = motion_of(record, name)
         notes = list(_units_of(opened, given, path))
     except InputError as error:
-        said = str(error)
-        where = "" if name in said else f"--motion {path}: " if path else f"{name}: "
-        raise InputError(_as_motion(f"{where}{said}")) from None
+        said = render(error.message, motion=True)
+        where = "" if name in said else f"{name_option('motion', path)}: " if path else f"{name}: "
+        raise InputError(f"{where}{said}") from None
     if measured(motion) and not opened.driven:
         # Times and positions alone, without a torque, are what somebody wants the axis to do.
         motion = replace(motion, source=f"points{motion.source.removeprefix('position')}")
-    words = (in_python(_as_motion(f"--motion {name}: {note.line()}."), "recommend") for note in notes)
-    return motion, tuple(words)
-
-
-def _as_motion(text: str) -> str:
-    """A message of reading, its option named as `recommend` has it."""
-    return text.replace("--map ", "--motion-map ")
+    return motion, tuple(
+        render(f"{name_option('motion', name)}: {note.line()}.", motion=True) for note in notes
+    )
 
 
 def _opened(log: Log | Path, given: Given) -> Opened:

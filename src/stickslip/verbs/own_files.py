@@ -12,6 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from stickslip.errors import InputError
+from stickslip.messages import name_option
 from stickslip.whole_files import write_whole
 
 LEDGER = ".stickslip-written"
@@ -41,7 +42,8 @@ def refuse_foreign(paths: Iterable[Path], force: bool = False) -> None:
             raise InputError(f"{path} is not a regular file; give another name")
         if not force and not ours(path):
             raise InputError(
-                f"{path} exists and was not written by stickslip, or was edited since; use --force to overwrite "
+                f"{path} exists and was not written by stickslip, or was edited since; use "
+                f"{name_option('force')} to overwrite "
                 "it, or give another name"
             )
 

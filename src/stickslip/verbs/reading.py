@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from stickslip.arguments import arguments_checked, insist_on, rules_in, written
 from stickslip.errors import InputError, UnknownName
 from stickslip.finding import Finding
+from stickslip.messages import name_option
 from stickslip.readers import profiles, remembered
 from stickslip.readers.convert import Drive
 from stickslip.readers.cut import Cut, cut, parse_rows, unwrapped
@@ -248,7 +249,7 @@ def _of_data(data: Any, reading: Reading, steady: bool) -> Record:
             steady=steady,
         )  # fmt: skip
     except InputError as error:
-        raise InputError(f"the log: {error}") from None
+        raise InputError(f"the log: {error.message}") from None
     return _with_digest(record, digest_of(table))
 
 
@@ -359,7 +360,7 @@ def _part(record: Record, reading: Reading, name: str) -> Record:
     try:
         return _cut(record, reading)
     except InputError as error:
-        raise InputError(f"{name}: {error}") from None
+        raise InputError(f"{name}: {error.message}") from None
 
 
 def _cut(record: Record, reading: Reading) -> Record:
@@ -368,14 +369,14 @@ def _cut(record: Record, reading: Reading) -> Record:
     if reading.get("unwrap"):
         record = unwrapped(record)
     ranges = reading.get("leave_out", ())
-    out = tuple(_rows("--leave-out", r) for r in ranges if not (isinstance(r, str) and r == "spikes"))
+    out = tuple(_rows("leave_out", r) for r in ranges if not (isinstance(r, str) and r == "spikes"))
     start, end, rows = reading.get("start"), reading.get("end"), reading.get("rows")
     part = cut(
         record,
         Cut(
             -math.inf if start is None else start,
             math.inf if end is None else end,
-            (1.0, math.inf) if rows is None else _rows("--rows", rows),
+            (1.0, math.inf) if rows is None else _rows("rows", rows),
             out,
         ),
     )
@@ -395,7 +396,7 @@ def _drive(reading: Reading) -> Drive:
     given: dict[str, Any] = {n: said[n] for n in (*NUMBERS, "side") if said.get(n) is not None}
     for name, value in given.items():
         if value != value:  # to a `Drive`, NaN is a number that nobody gave
-            raise InputError(f"--{name.replace('_', '-')} {value} must be a number greater than 0")
+            raise InputError(f"{name_option(name, value)} must be a number greater than 0")
     return Drive(**given)
 
 
@@ -404,5 +405,7 @@ def beside_of(reading: Reading, count: int) -> list[str | os.PathLike[str] | Non
     given = reading.get("beside")
     every = [given] if isinstance(given, (str, os.PathLike)) else list(given or [])
     if len(every) not in (0, count):
-        raise InputError(f"--with is given {len(every)} times for {count} LOGs; give it once for each")
+        raise InputError(
+            f"{name_option('beside')} is given {len(every)} times for {count} LOGs; give it once for each"
+        )
     return list(every) or [None] * count

@@ -14,11 +14,12 @@ from stickslip.arguments import arguments_checked
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller, sample_time_in
 from stickslip.control.linear import Cascade, Gains
-from stickslip.control.own_loop import ReferenceVelocity, kind_of_loop, split_loop
+from stickslip.control.own_loop import ReferenceVelocity, kind_of_loop, loop_text, split_loop
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
+from stickslip.messages import name_loop, name_option
 from stickslip.recommend import recommend as setting
 from stickslip.recommend.candidate_run import Drive
 from stickslip.recommend.resolution import encoder_for
@@ -151,7 +152,9 @@ def recommend(
     refuse_numbers(axes, confirm)
     refuse_together(motion, amplitude, frequency)
     if motion_map and motion is None:
-        raise InputError("--motion-map says how the log of --motion is read; give that, too")
+        raise InputError(
+            f"{name_option('motion_map')} says how the log of {name_option('motion')} is read; give that, too"
+        )
     if loop is not None:
         refuse_beside_loop(loop, linear=linear, bandwidth=bandwidth, damping=damping)
     gains, corner, limit, stated = own_loop(loop, torque_limit)
@@ -182,7 +185,7 @@ def recommend(
         drive = drive_with(controller, holding, found, inertia, sample_time, at_hand)
     else:
         counts, source = encoder_for(found, counts_per_rev, at_hand)
-        formed = one_of(reference_velocity, stated, "--loop")
+        formed = one_of(reference_velocity, stated, name_option("loop"))
 
         def sampled(period: float, told_by: str = "") -> Drive:
             return Drive(
@@ -220,11 +223,12 @@ def refuse_numbers(axes: int, confirm: int) -> None:
     """
     if axes < 1:
         raise InputError(
-            f"--axes {axes} must be at least 1: what is safe on the best estimate alone need not be on the machine"
+            f"{name_option('axes', axes)} must be at least 1: what is safe on the best estimate alone need not "
+            "be on the machine"
         )
     if confirm < 0:
         raise InputError(
-            f"--confirm {confirm} must be at least 0, which confirms nothing; leave it out for 39"
+            f"{name_option('confirm', confirm)} must be at least 0, which confirms nothing; leave it out for 39"
         )
 
 
@@ -236,9 +240,14 @@ def refuse_together(motion: object | None, amplitude: float | None, frequency: f
     InputError
     """
     if motion is not None and amplitude is not None:
-        raise InputError("--motion and --amplitude exclude each other; give one of them")
+        raise InputError(
+            f"{name_option('motion')} and {name_option('amplitude')} exclude each other; give one of them"
+        )
     if frequency is not None and amplitude is None:
-        raise InputError(f"--frequency {frequency:g} needs a sinusoid; give --amplitude too")
+        raise InputError(
+            f"{name_option('frequency', f'{frequency:g}')} needs a sinusoid; give "
+            f"{name_option('amplitude')} too"
+        )
 
 
 def refuse_beside_loop(loop: object, **given: object) -> None:
@@ -250,12 +259,14 @@ def refuse_beside_loop(loop: object, **given: object) -> None:
     """
     if not loop:
         raise InputError(
-            f"--loop: {loop!r} names no gain; give them, such as --loop kp=8,kd=0.08, or leave it out"
+            f"{name_option('loop')}: {loop!r} names no gain; give them, such as {name_loop('kp=8,kd=0.08')}, or "
+            "leave it out"
         )
     for name, value in given.items():
         if value != USUAL[name]:
             raise InputError(
-                f"--{name} {value} cannot be combined with --loop, which sets the gains; leave one out"
+                f"{name_option(name, value)} cannot be combined with {name_option('loop')}, which sets the "
+                "gains; leave one out"
             )
 
 
@@ -268,10 +279,10 @@ def refuse_beside(controller: object, **given: object) -> None:
     """
     for name, value in given.items():
         if value != USUAL[name]:
-            option = name.replace("_", "-")
             file = f" {controller}" if isinstance(controller, (str, os.PathLike)) else ""
             raise InputError(
-                f"--{option} cannot be combined with --controller{file}, which sets it; leave it out"
+                f"{name_option(name)} cannot be combined with {name_option('controller')}{file}, which sets it; "
+                "leave it out"
             )
 
 
@@ -323,7 +334,9 @@ def one_of(
         If both differ.
     """
     if given is not None and own is not None and given != own:
-        raise InputError(f"--reference-velocity {given}, and {owner} states {own}; leave one of them out")
+        raise InputError(
+            f"{name_option('reference_velocity', given)}, and {owner} states {own}; leave one of them out"
+        )
     return given or own
 
 
@@ -343,7 +356,8 @@ def own_loop(
     gains, own, formed = loop_of(given)
     if "limit" in own and math.isfinite(torque_limit):
         raise InputError(
-            f"--torque-limit {torque_limit:g} and the limit of --loop exclude each other; give one of them"
+            f"{name_option('torque_limit', f'{torque_limit:g}')} and the limit of {name_option('loop')} exclude "
+            "each other; give one of them"
         )
     return gains, own.get("filter", 0.0), own.get("limit", torque_limit), formed
 
@@ -364,9 +378,9 @@ def loop_of(
         above = value > 0.0 if name == "limit" else value >= 0.0 and math.isfinite(value)
         if not above:
             raise InputError(
-                f"--loop: {name} = {value:g} must be a number of 0 or more, a limit greater than 0"
+                f"{name_option('loop')}: {name} = {value:g} must be a number of 0 or more, a limit greater than 0"
             )
     if kind is Gains and not numbers.get("kp", 0.0) > 0.0:
-        raise InputError(f"--loop {given}: give kp, greater than 0")
+        raise InputError(f"{name_loop(loop_text(given))}: give kp, greater than 0")
     own = {name: numbers.pop(name) for name in ("filter", "limit") if name in numbers}
     return kind(**numbers), own, formed

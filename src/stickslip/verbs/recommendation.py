@@ -13,7 +13,6 @@ from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
-from stickslip.in_python import data_in_python, in_python
 from stickslip.model import Model
 from stickslip.recommend.file import setting_table, write_setting
 from stickslip.recommend.recommend import Candidate, Recommendation
@@ -63,8 +62,7 @@ class RecommendationResult:
                 f"{self.recommendation.instead.label} is recommended, which is a whole controller; take controller"
             )
         if self.recommendation.model is None:
-            why = in_python(self.recommendation.why_none, "recommend")
-            raise InputError(f"no compensator is recommended: {why}")
+            raise InputError(f"no compensator is recommended: {self.recommendation.why_none}")
         return self.recommendation.model
 
     @property
@@ -106,7 +104,7 @@ class RecommendationResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user must know, one sentence each."""
-        return tuple(in_python(n, "recommend") for n in self.recommendation.notes)
+        return self.recommendation.notes
 
     @arguments_checked
     def save(self, path: str | os.PathLike[str] = "recommended.toml") -> Path:
@@ -133,11 +131,10 @@ class RecommendationResult:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, all candidates too."""
-        return data_in_python(self.recommendation.as_dict(), "recommend")
+        return self.recommendation.as_dict()
 
     def __str__(self) -> str:
-        lines = recommendation_lines(self.recommendation, self.identified.unit)
-        return "\n".join(in_python(line, "recommend") for line in lines)
+        return "\n".join(recommendation_lines(self.recommendation, self.identified.unit))
 
     def __repr__(self) -> str:
         if self.recommendation.instead is not None:

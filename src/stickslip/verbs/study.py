@@ -10,6 +10,7 @@ from typing import Any
 
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
+from stickslip.messages import name_option
 from stickslip.study import study as studies
 from stickslip.study.bench import is_bench
 from stickslip.study.plan import Study, load, select
@@ -100,7 +101,7 @@ def study_of(
         If the file is not a study's, or a number cannot be.
     """
     if seeds is not None and seeds < 0:
-        raise InputError(f"--seeds {seeds} must be 0 or more")
+        raise InputError(f"{name_option('seeds', seeds)} must be 0 or more")
     given: dict[str, Any] = {} if seeds is None else {"seeds": seeds}
     if not ablation:
         given["ablation"] = False

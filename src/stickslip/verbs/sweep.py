@@ -16,6 +16,7 @@ from stickslip.capacity import insist_on_jobs
 from stickslip.errors import InputError
 from stickslip.extras import needed
 from stickslip.identify.estimate import silent
+from stickslip.messages import name_option
 from stickslip.sweep import dataset, execute
 from stickslip.sweep.gains import too_few
 from stickslip.sweep.plan import MOST_CASES, Sweep, load
@@ -213,12 +214,12 @@ def sweep_of(file: str | os.PathLike[str] | Sweep, cases: int | None = None, sho
     if cases is None:
         return found
     if cases < 1:
-        raise InputError(f"--cases {cases} must be at least 1")
+        raise InputError(f"{name_option('cases', cases)} must be at least 1")
     if found.drawn.method == "grid":
         raise InputError(
-            f"--cases {cases}: {name} is a grid, whose points make its {found.drawn.cases} cases; "
+            f"{name_option('cases', cases)}: {name} is a grid, whose points make its {found.drawn.cases} cases; "
             "change `points` or `values` in it, or its `method` to sobol"
         )
     if cases > MOST_CASES:
-        raise InputError(f"--cases {cases} are too many; keep below {MOST_CASES}")
+        raise InputError(f"{name_option('cases', cases)} are too many; keep below {MOST_CASES}")
     return replace(found, drawn=replace(found.drawn, cases=cases))

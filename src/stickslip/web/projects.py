@@ -59,7 +59,7 @@ def words(name: object, otherwise: str) -> str:
 
 def written_whole(path: Path, data: Mapping[str, Any]) -> None:
     """Write JSON so that a reader sees the file before or after, never half of it."""
-    write_whole(path, json.dumps(data, ensure_ascii=False, allow_nan=False), "--projects")
+    write_whole(path, json.dumps(data, ensure_ascii=False, allow_nan=False), "projects")
 
 
 def read_whole(path: Path) -> dict[str, Any]:
@@ -230,7 +230,7 @@ class Projects:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        prepared_folder(folder, "--projects")
+        prepared_folder(folder, "projects")
 
     def add(self, name: object = "") -> Project:
         """A new project."""

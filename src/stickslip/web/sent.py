@@ -59,7 +59,7 @@ def table(site: Site) -> Table:
         name = words(main.removesuffix(".toml"), "study")
         item = project.add(kind, name=name, sent=sorted(files), state="looking")
         for name, content in stored.items():
-            write_whole(item.folder / name, content, "--projects")
+            write_whole(item.folder / name, content, "projects")
         return begin(project, item, LOOK, f"Looking at {main}")
 
     async def approve(request: Request) -> Response:

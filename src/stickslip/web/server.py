@@ -13,6 +13,7 @@ from pathlib import Path
 import uvicorn
 
 from stickslip.errors import InputError
+from stickslip.messages import Surface, shown_on
 from stickslip.web.app import Options, make_app
 from stickslip.web.security import new_token
 
@@ -69,7 +70,8 @@ def serve(
     if browser:
         webbrowser.open(address)
     server = uvicorn.Server(config)
-    asyncio.run(server.serve(sockets=sockets))
+    with shown_on(Surface.PAGE):
+        asyncio.run(server.serve(sockets=sockets))
 
 
 def bracketed(host: str) -> str:

@@ -16,7 +16,6 @@ from stickslip.errors import InputError
 from stickslip.web.projects import Item, written_whole
 from stickslip.web.rig_tasks import RIG_TASKS
 from stickslip.web.sent_tasks import SENT_TASKS
-from stickslip.web.wording import in_the_page
 from stickslip.web.worker import Said, plain
 from stickslip.whole_files import draft_of
 
@@ -39,7 +38,7 @@ def read(request: Request, say: Said) -> dict[str, Any]:
     try:
         opened = open_log(path, reading)
     except InputError as error:
-        problem = in_the_page(called(error, path, name))
+        problem = called(error, path, name)
         return {"readable": False, "problem": problem, **unread(columns_of, path)}
     record = opened.record
     record.meta["reading"]["file"] = name
@@ -58,7 +57,7 @@ def read(request: Request, say: Said) -> dict[str, Any]:
     written_whole(item.folder / "result.json", plain({"planes": planes(found.record)}))
     return {
         **about, "readable": True,
-        "findings": [{**f.as_data(), "remedy": in_the_page(f.remedy)} for f in found.findings],
+        "findings": [f.as_data() for f in found.findings],
         "errors": len(found.errors),
     }  # fmt: skip
 
@@ -120,12 +119,10 @@ def identify(request: Request, say: Said) -> dict[str, Any]:
     told = found.as_dict()
     result = {
         **told, "text": found.summary(),
-        "notes": [in_the_page(n) for n in told["notes"]],
-        "measure_next": [in_the_page(n) for n in told["measure_next"]],
         "answers": {
             "friction": answers.friction, "trust": answers.trust, "evidence": answers.evidence,
             "steps": [{"what": s.what, "command": s.command} for s in answers.steps],
-            "told": [in_the_page(n) for n in answers.told],
+            "told": answers.told,
         },
         "findings": [f.as_data() for f in found.findings],
         "pictures": [picture_data(p) for p in found.pictures],

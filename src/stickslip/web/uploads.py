@@ -33,7 +33,9 @@ async def received(request: Request, path: Path, most: int) -> tuple[int, str]:
     said = request.headers.get("content-length", "0")
     size, digest = 0, hashlib.sha256()
     too_large = Refused(
-        413, f"the file is larger than the {most / 2**20:.0f} MB that are taken; --max-upload says it"
+        413,
+        f"the file is larger than the {most / 2**20:.0f} MB that are taken; start `stickslip web "
+        "--max-upload MB` for more",
     )
     if not said.isdecimal() or len(said) > 15 or int(said) > most:
         raise too_large

@@ -20,7 +20,7 @@ from typing import Any, TextIO
 from stickslip.capacity import limit_memory
 from stickslip.config import confined_to
 from stickslip.errors import StickslipError
-from stickslip.in_python import with_options
+from stickslip.messages import Surface, shown_on
 
 Said = Callable[[dict[str, Any]], None]
 """Sends one line to the server."""
@@ -67,16 +67,15 @@ def get_ready() -> None:
     importlib.import_module("stickslip.web.tasks")
 
 
+@shown_on(Surface.PAGE)
 def outcome(request: dict[str, Any], say: Said) -> dict[str, Any]:
     """The last line."""
     try:
         tasks = importlib.import_module("stickslip.web.tasks")
-        # Options are what the page has words of its own for.
-        with with_options(), confined_to(Path(request["project"])):
+        with confined_to(Path(request["project"])):
             return {"done": tasks.TASKS[request["task"]](request, say)}
     except StickslipError as error:
-        words = importlib.import_module("stickslip.web.wording").in_the_page(str(error))
-        return {"error": " ".join(words.split()), "kind": type(error).__name__}
+        return {"error": " ".join(str(error).split()), "kind": type(error).__name__}
     except MemoryError:
         return {
             "error": "this needs more memory than a file of its size may take; give a part of it, or another format"

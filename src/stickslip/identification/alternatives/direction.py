@@ -6,8 +6,11 @@ import numpy as np
 
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.alternatives.curve import octaves
+from stickslip.messages import name_option
 
-REMEDY = "identify friction per direction (--per-direction), or record both directions alike"
+REMEDY = (
+    f"identify friction per direction ({name_option('per_direction', True)}), or record both directions alike"
+)
 VISCOUS = Alternative(
     "viscous friction by direction", lambda rows: rows.see(lambda r: np.abs(r.velocity)) / rows.fastest,
     present=(0.1,), odds=0.2, even=lambda v, rows: (v / rows.fastest)[:, None],

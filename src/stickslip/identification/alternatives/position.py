@@ -10,6 +10,7 @@ import numpy as np
 from stickslip.identification.alternatives.alternative import Alternative, legendre
 from stickslip.identification.rows import SlidingRows
 from stickslip.identification.strokes import SlidingRecord
+from stickslip.messages import name_option
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -17,7 +18,7 @@ WAVES, PERIOD = 24, 1.5
 """Sines and cosines of one and a half times the range: a smooth function on the range is no periodic one."""
 SIZES, SCALES = (0.01, 0.03, 0.1), (1.0, 4.0, 16.0)
 """Parts of Fc, and waves within the range, of a random function over the position."""
-REMEDY = "map the torque over the position (--method cogging), or record over a longer way"
+REMEDY = f"map the torque over the position ({name_option('method', 'cogging')}), or record over a longer way"
 
 
 def waves(rows: SlidingRows) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.rows import SlidingRows
+from stickslip.messages import name_option
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -24,7 +25,8 @@ def one_row(rows: SlidingRows) -> Array:
 ALTERNATIVES = (
     Alternative(
         "late torque", lambda rows: rows.jerk[:, None], "skew", present=(3.0,),
-        cause="the delay of the torque column", remedy="log torque and motion by one clock, or state --delay",
+        cause="the delay of the torque column", remedy="log torque and motion by one clock, or state "
+            f"{name_option('delay')}",
     ),
     Alternative(
         "no mere delay", one_row, "inertia", absent=0.03, present=(0.1,),

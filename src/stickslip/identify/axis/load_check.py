@@ -16,6 +16,7 @@ import numpy as np
 
 from stickslip.identify.estimate import Estimate
 from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.messages import name_option
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -31,7 +32,8 @@ OUTER = ("offset", "gravity_", "cos[", "sin[")
 """Names of the torques from outside among the columns of the inverse dynamics."""
 ADVICE = (
     "Record decelerations so hard that the drive brakes: only there load-dependent friction can be "
-    "distinguished. Without load_motor (--load) the other values hold at the load of these records."
+    f"distinguished. Without load_motor ({name_option('load', True)}) the other values hold at the load of "
+    "these records."
 )
 
 

@@ -31,6 +31,7 @@ from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.jackknife import leave_blocks_out
 from stickslip.identify.fit.noise import white_std
 from stickslip.identify.fit.student import student_quantile
+from stickslip.messages import Note, name_option
 from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 
@@ -57,7 +58,7 @@ CUT = 0.98
 """Part of the limit, or of what is exceeded in 0.1 % of the rows, from which on a signal counts as cut off."""
 EXPLAINED, MISSED, WORSE = 0.3, 0.05, 2.0
 """Parts of the signal that the shown gains may leave, and that the given ones must leave, so much more than those."""
-OTHER_LOOP = "shows another controller than the loop given"
+OTHER_LOOP = "other-loop"
 OTHER, FELT = 0.1, 0.03
 """Relative difference of a gain, and its part of the signal, from which on it is told."""
 
@@ -139,12 +140,14 @@ def doubt(name: str, shown: ShownGains) -> str:
     why = (
         "every gain shown is negative: the recorded signal's sign may be turned."
         if shown.turned
-        else "check --loop, its period too; a filter or a feedforward in the controller can look like this as well."
+        else f"check {name_option('loop')}, its period too; a filter or a feedforward in the controller can "
+        "look like this as well."
     )
     which = " (as a PID)" if shown.cascade else ""
-    return (
-        f"{name} {OTHER_LOOP}{which}: {'; '.join(differing)}. The gains given miss the "
-        f"recorded signal by {shown.missed:.0%}, those shown by {shown.left:.1%}: {why}"
+    return Note(
+        f"{name} shows another controller than the loop given{which}: {'; '.join(differing)}. The gains given miss the "
+        f"recorded signal by {shown.missed:.0%}, those shown by {shown.left:.1%}: {why}",
+        OTHER_LOOP,
     )
 
 

@@ -23,6 +23,7 @@ from stickslip.identify.fit.axis_start import level_of
 from stickslip.identify.fit.uncertainty import Fit, fit
 from stickslip.identify.regression.inverse import InverseDynamics, correlation_lags
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import axis_unit
 from stickslip.spec import Law
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -55,7 +56,7 @@ class OutputError(FittedAxis):
         e = replace(e, unit=self.problem.axis.unit(e.unit))
         value = getattr(self.model.parameters, e.name, e.value)
         if isinstance(value, float) and value > e.value * (1.0 + 1e-9) > 0.0:
-            why = f"the law allows no value below {value:.4g} {e.unit}, and the data ask for none above"
+            why = f"the law allows no value below {value:.4g} {axis_unit(e.unit)}, and the data ask for none above"
             return replace(e, value=value, identified=False, verdict=why)
         return e
 

@@ -37,6 +37,7 @@ from stickslip.identify.estimate import Estimate, Identification, Picture
 from stickslip.identify.experiment import Experiment
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import name_option
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -146,7 +147,9 @@ def over_angle(
     if axis.motion != "rotary":
         raise InputError("the positions are lengths; give the motor's angle")
     if any(t.drive is None or t.closed_loop for t in experiments):
-        raise InputError("it is found in the recorded torque, not in a simulated loop; leave --loop out")
+        raise InputError(
+            f"it is found in the recorded torque, not in a simulated loop; leave {name_option('loop')} out"
+        )
     sliding = estimate(experiments, axis, Asked(axis.gravity == "pendulum", skew=skew))
     places = places_of(sliding, axis)
     refuse_narrow(places)

@@ -25,6 +25,7 @@ from stickslip.identify.fit.levenberg_marquardt import Squares
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import name_parameter
 from stickslip.model import Model
 from stickslip.simulation.recorded_input.simulation import Mechanics
 from stickslip.spec import Law
@@ -232,7 +233,8 @@ def ranked_starts(
             out.append((cost, problem, vector.start))
     if not out:
         raise InputError(
-            f"{law.name}: no simulation from the starting values succeeds; give others with --set"
+            f"{law.name}: no simulation from the starting values succeeds; give others with "
+            f"{name_parameter('NAME', 'VALUE')}"
         )
     return sorted(out, key=lambda found: found[0])
 
@@ -342,8 +344,8 @@ def require_start(
             experiments, axis, harmonics=extras.harmonics, harmonic_period=extras.harmonic_period
         )
     except InputError as error:
-        why = str(error)
-    settings = " and ".join(f"--set {name}=.." for name in needed)
+        why = error.message
+    settings = " and ".join(name_parameter(name) for name in needed)
     raise InputError(f"{why}; or say where the search starts with {settings}")
 
 

@@ -41,6 +41,7 @@ from stickslip.identify.estimate import Identification, silent
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.motor import Harmonics
 from stickslip.machines.position_map import PositionMap, Waves
+from stickslip.messages import name_option
 from stickslip.model import Model
 from stickslip.record import Record
 
@@ -116,7 +117,10 @@ def _unit(records: Sequence[Record], torque: str) -> str:
     if len(units) != 1:
         raise InputError(f"{torque} is in {' and in '.join(sorted(units))}; give all records in one unit")
     if any(r.units.get("position") not in ("rad", None) for r in records):
-        raise InputError("--method cogging takes angles in rad; for a linear axis give the motor's angle")
+        raise InputError(
+            f"{name_option('method', 'cogging')} takes angles in rad; for a linear axis give the "
+            "motor's angle"
+        )
     return units.pop()
 
 
@@ -129,10 +133,11 @@ def _usable(places: Places, records: Sequence[Record]) -> Places:
             if min(speeds) > FASTEST
             else f"{len(places)} places are left, {LEAST} are needed; record a revolution each way, slowly"
         )
-        raise InputError(f"--method cogging: {why}")
+        raise InputError(f"{name_option('method', 'cogging')}: {why}")
     if len(set(places.direction.tolist())) < 2:
         raise InputError(
-            "--method cogging: only one direction is recorded, so that friction cannot be distinguished from "
+            f"{name_option('method', 'cogging')}: only one direction is recorded, so that friction cannot be "
+            "distinguished from "
             "the offset; record "
             "the same way forth and back"
         )

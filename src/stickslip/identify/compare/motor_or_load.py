@@ -10,6 +10,7 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
+from stickslip.messages import name_file, name_option
 from stickslip.model import Model
 
 
@@ -30,7 +31,7 @@ def on_one_side(first: Identified, second: Identified) -> tuple[Identified, str]
     if max(known) > 1.0001 * min(known):
         raise InputError(
             f"{first.path} has a gear ratio of {ratios[0]:g} and {second.path} one of {ratios[1]:g}: they are not "
-            "about one axis; identify them with the same --gear-ratio"
+            f"about one axis; identify them with the same {name_option('gear_ratio')}"
         )
     n = known[0] if sides[1] == "load" else 1.0 / known[0]
     note = (
@@ -46,7 +47,7 @@ def through_gear(found: Identified, n: float) -> Identified:
     values: dict[str, Any] = {}
     parameters: dict[str, Any] = found.model.parameters._asdict()
     for name, value in parameters.items():
-        factor = _factor(units[name], n, f"{found.path}: {name}")
+        factor = _factor(units[name], n, f"{name_file(found.path)}: {name}")
         values[name] = factor * value if isinstance(value, float) else [factor * v for v in value]
     estimates = tuple(
         replace(e, **{k: getattr(e, k) * _factor(units.get(e.name.partition("[")[0], e.unit), n, e.name)

@@ -33,7 +33,6 @@ from stickslip.identify.doctor import (
 )
 from stickslip.identify.doctor.steady_table import examine_table, is_steady_table
 from stickslip.identify.doctor.view import View
-from stickslip.in_python import in_python
 from stickslip.readers.cut import range_words, taken
 from stickslip.record import Record
 
@@ -89,6 +88,10 @@ class Diagnosis:
     findings: tuple[Finding, ...]
     record: Record
 
+    def __post_init__(self) -> None:
+        arrays = of_arrays(self.record)
+        object.__setattr__(self, "findings", tuple(f.rendered(arrays) for f in self.findings))
+
     @property
     def errors(self) -> tuple[Finding, ...]:
         """What makes the record unusable."""
@@ -99,18 +102,14 @@ class Diagnosis:
         """What makes a result doubtful."""
         return tuple(f for f in self.findings if f.level == "warning")
 
-    def _line(self, finding: Finding) -> str:
-        """A finding in words: in Python its remedy names arguments, of arrays their own."""
-        return in_python(finding.line(), "identify", of_arrays(self.record))
-
     def __str__(self) -> str:
-        lines = [f"{f.level:<8}{f.code:<24}{self._line(f)}" for f in self.findings]
+        lines = [f"{f.level:<8}{f.code:<24}{f.line()}" for f in self.findings]
         return "\n".join([*lines, f"{len(self.errors)} errors, {len(self.warnings)} warnings"])
 
     def _repr_html_(self) -> str:
         """A table in a notebook."""
         rows = "".join(
-            f"<tr><td>{f.level}</td><td>{escape(f.code)}</td><td>{escape(self._line(f))}</td></tr>"
+            f"<tr><td>{f.level}</td><td>{escape(f.code)}</td><td>{escape(f.line())}</td></tr>"
             for f in self.findings
         )
         tally = f"<p>{len(self.errors)} errors, {len(self.warnings)} warnings in {len(self.record)} usable rows</p>"
@@ -136,15 +135,6 @@ def of_arrays(record: Record) -> bool:
     reading: dict[str, Any] = record.meta.get("reading", {})
     sources = {c["source"] for c in reading.get("columns", ())}
     return not reading.get("file") and sources == {"map"}
-
-
-def findings_in_python(findings: Sequence[Finding], record: Record) -> tuple[Finding, ...]:
-    """Findings whose words name arguments to whoever called a function."""
-    arrays = of_arrays(record)
-    return tuple(
-        replace(f, **{n: in_python(getattr(f, n), "identify", arrays) for n in ("message", "remedy")})
-        for f in findings
-    )
 
 
 def examine(

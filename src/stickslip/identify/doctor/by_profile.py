@@ -5,13 +5,13 @@ A profile holds for files with the same names of columns; those of another drive
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import View
+from stickslip.messages import name_columns, name_option
 
 MOTION, DRIVEN = ("position", "velocity", "time"), ("motor_torque", "current", "friction_torque")
 CONCERNS = {
@@ -38,8 +38,8 @@ def _told(finding: Finding, view: View) -> Finding:
     saved = bool(_reading(view).get("saved_profile"))
     whose = "a saved profile, found by the names of the columns," if saved else "the profile"
     units = " and ".join(f"{c} in {view.columns[c].unit}" for c in by)
-    without = " ".join("--map " + shlex.quote(f"{c}={view.name(c)}") for c in by)
-    also = "; --profile NEW.toml leaves out all that it says" if saved else ""
+    without = name_columns(**{c: view.name(c) for c in by})
+    also = f"; {name_option('profile', 'NEW.toml')} leaves out all that it says" if saved else ""
     message = f"{finding.message}; {whose} says {units}"
     remedy = f"{finding.remedy}, or {without} to leave that out{also}"
     turned = [c for c in by if view.columns[c].unit.startswith("-")]

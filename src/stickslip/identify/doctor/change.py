@@ -20,6 +20,7 @@ from stickslip.finding import Finding
 from stickslip.identification.notes import drift_of
 from stickslip.identify.doctor.view import Array, Mask, Smooth, View, row
 from stickslip.identify.fit.profile import long_run
+from stickslip.messages import name_option
 
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 
@@ -91,7 +92,10 @@ def _drifting(view: View) -> Iterator[Finding]:
     if drift is None or abs(drift.share) < DRIFTS_BY:
         return
     message = f"friction {drift} over the record: what is identified is that of its middle"
-    remedy = "let the machine warm up before, or identify parts alone, with --from and --to"
+    remedy = (
+        f"let the machine warm up before, or identify parts alone, with {name_option('start')} and "
+        f"{name_option('end')}"
+    )
     yield Finding("warning", "change", message, remedy=remedy)
 
 
@@ -133,13 +137,16 @@ def _between_blocks(view: View) -> Iterator[Finding]:
     message = " and ".join(_words(n, s, view, alone) for n, s in zip(WORTH, sizes, strict=True) if n in told)
     if first.gradual:
         message += " over the record: it is not one machine throughout"
-        remedy = "let the machine warm up, or identify parts alone, with --from and --to"
+        remedy = (
+            f"let the machine warm up, or identify parts alone, with {name_option('start')} and "
+            f"{name_option('end')}"
+        )
         yield Finding("warning", "change", message, remedy=remedy)
         return
     moment = float(view.time[0]) + int(rows[cut]) * smooth.period
     index = int(np.nanargmin(np.abs(view.record.time - moment)))
     at = float(view.record.time[index])
-    remedy = f"identify each part alone: --to {at:.6g}, and --from {at:.6g}"
+    remedy = f"identify each part alone: {name_option('end', f'{at:.6g}')}, and {name_option('start', f'{at:.6g}')}"
     message += ": before and after it is not the same machine"
     yield Finding("warning", "change", message, row(index, view), remedy)
 
@@ -175,7 +182,7 @@ def temperature(view: View) -> Iterator[Finding]:
     begin, end = float(np.median(values[:tenth])), float(np.median(values[-tenth:]))
     if abs(end - begin) >= WARMER:
         message = f"the temperature goes from {begin:.4g} to {end:.4g} °C; friction changes with it"
-        remedy = "identify parts alone, with --from and --to, or record a warm machine"
+        remedy = f"identify parts alone, with {name_option('start')} and {name_option('end')}, or record a warm machine"
         yield Finding("warning", "temperature-change", message, remedy=remedy)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import NEVER, View
+from stickslip.messages import name_columns, name_option
 from stickslip.record import encoder_step
 
 
@@ -19,7 +20,7 @@ def channels(view: View) -> Iterator[Finding]:
             "error",
             "missing-column",
             "there is neither position nor velocity",
-            remedy="say which column it is, such as --map position=COLUMN:deg",
+            remedy=f"say which column it is, such as {name_columns(position='COLUMN:deg')}",
         )
     elif not view.has("position") and view.torque_channel != "friction_torque":
         yield Finding(
@@ -27,28 +28,34 @@ def channels(view: View) -> Iterator[Finding]:
             "missing-column",
             "there is a velocity but no position: `identify` integrates it, from 0, so that neither the first "
             "hundredths of a degree after a reversal nor anything that depends on the position shows",
-            remedy="log the position as well, and say which column it is, such as --map position=COLUMN:rad",
+            remedy="log the position as well, and say which column it is, such as "
+            f"{name_columns(position='COLUMN:rad')}",
         )
     if not view.torque_channel:
         if view.has("current"):
-            screw = "give --force-constant N_PER_A, or of a screw --torque-constant NM_PER_A and --lead MM"
+            screw = (
+                f"give {name_option('force_constant', 'N_PER_A')}, or of a screw "
+                f"{name_option('torque_constant', 'NM_PER_A')} and {name_option('lead', 'MM')}"
+            )
             yield Finding(
                 "error",
                 "missing-column",
                 "there is current but no torque",
-                remedy=screw if view.effort == "N" else "give --torque-constant NM_PER_AMPERE",
+                remedy=screw
+                if view.effort == "N"
+                else f"give {name_option('torque_constant', 'NM_PER_AMPERE')}",
             )
         else:
             maybe = view.unused_drives
             listed = ", ".join(repr(name) for name in maybe[:4])
             which = f" (not used, with a unit that may say it: {listed})" if maybe else ""
-            mapped = f"if a column{which} holds it, say --map torque=COLUMN:{view.effort}"
+            mapped = f"if a column{which} holds it, say {name_columns(torque=f'COLUMN:{view.effort}')}"
             message = "there is no torque, force or current: only a machine model can replace it"
             if view.has("voltage"):
                 message = "there is a voltage and no torque, force or current"
                 mapped = (
-                    "identify computes the torque from the voltage with --resistance OHM and --torque-constant "
-                    f"NM_PER_A; {mapped}"
+                    f"identify computes the torque from the voltage with {name_option('resistance', 'OHM')} and "
+                    f"{name_option('torque_constant', 'NM_PER_A')}; {mapped}"
                 )
             yield Finding("warning", "missing-column", message, remedy=mapped)
 
@@ -68,7 +75,8 @@ def moved(view: View) -> Iterator[Finding]:
                 "no-torque",
                 f"{view.torque_channel} is {torque[0]:g} throughout",
                 remedy=f"check that {view.name(view.torque_channel)!r} was logged; if the axis coasts with the drive "
-                "off, log the push before it as well, or take --method sliding with --inertia=KGM2",
+                f"off, log the push before it as well, or take {name_option('method', 'sliding')} with "
+                f"{name_option('inertia', 'KGM2')}",
             )
 
 

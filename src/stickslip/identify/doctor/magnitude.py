@@ -11,6 +11,7 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.identify.doctor.physics import line_of, usable
 from stickslip.identify.doctor.view import Smooth, View
+from stickslip.messages import name_option
 
 BOTH = 0.1
 """Share of the moving rows in either direction, and with either sign of the acceleration, that is motion both ways."""
@@ -47,7 +48,7 @@ def unsigned(view: View) -> Iterator[Finding]:
     )
     remedy = (
         "log the signed torque or current of the drive (its other trace, or a column that is not cut to a magnitude); "
-        "what is recorded cannot be turned into it; --accept torque-magnitude if it has its sign"
+        f"what is recorded cannot be turned into it; {name_option('accept', 'torque-magnitude')} if it has its sign"
     )
     yield Finding("error" if sure else "warning", "torque-magnitude", message, remedy=remedy)
 

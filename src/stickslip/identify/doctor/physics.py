@@ -18,6 +18,7 @@ from stickslip.finding import Finding
 from stickslip.identify.doctor.view import NEVER, Array, Smooth, View
 from stickslip.identify.fit.shifts import least_between, shifts_looked_at
 from stickslip.identify.fit.uncertainty import RATIO
+from stickslip.messages import name_option, name_options
 from stickslip.readers.convert import pendulum_before_gear
 
 ROWS = 20_000
@@ -95,7 +96,8 @@ def sign(view: View) -> Iterator[Finding]:
     also = " and the inertia would be negative" if fit.values[0] < 0.0 else ""
     message = f"friction would drive the axis: its work over the record is negative{also}"
     remedy = (
-        f"say {turned}, if positive torque drives backwards, or --accept torque-sign if you know it is right"
+        f"say {turned}, if positive torque drives backwards, or {name_option('accept', 'torque-sign')} if you "
+        "know it is right"
     )
     yield Finding("error", "torque-sign", message, remedy=remedy)
 
@@ -238,7 +240,10 @@ def gravity(view: View) -> Iterator[Finding]:
         if own:
             message = f"the mean torque depends on the angle: {own:.3g} {unit} once a turn, as gravity does"
             yield Finding(
-                "warning", "gravity", message, remedy="identify with --pendulum, or turn the axis upright"
+                "warning",
+                "gravity",
+                message,
+                remedy=f"identify with {name_option('pendulum', True)}, or turn the axis upright",
             )
             return
         if _hangs_in_degrees(smooth, min(plain.rest, rest)):
@@ -291,7 +296,7 @@ def _offset(view: View, smooth: Smooth, plain: Fit) -> Iterator[Finding]:
         message = f"the torque has a constant part of {offset:.3g} {view.record.units['motor_torque']}{part}"
         remedy = (
             "a weight, a spring, an offset of the sensor, which is identified along, or friction that differs by "
-            "direction (identify --per-direction)"
+            f"direction (identify {name_option('per_direction', True)})"
         )
         yield Finding("note", "offset", message, remedy=remedy)
 
@@ -331,7 +336,7 @@ def _degrees_or_gear(view: View, smooth: Smooth) -> Finding:
     fine: Array = np.linspace(best / 1.04, 1.04 * best, 41)
     rests = [_fit(smooth, 0, periodic=True, turn=n * math.tau).rest for n in fine]
     best, least = float(fine[int(np.argmin(rests))]), min(rests)
-    seen = f"--gear-ratio {best:.3g} --side load --pendulum"
+    seen = name_options(gear_ratio=f"{best:.3g}", side="load", pendulum=True)
     other = not 1.0 / APART < best / IN_DEGREES < APART
     if other and least < CLOSER * _fit(smooth, 0, periodic=True, turn=360.0).rest:
         turns = f"{best * math.tau:.4g} rad, {best:.3g} turns"

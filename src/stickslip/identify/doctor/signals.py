@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from stickslip.finding import Finding, times
 from stickslip.identify.doctor.spikes import LATE, sticking_out
 from stickslip.identify.doctor.view import Array, Mask, View, is_number, row
+from stickslip.messages import name_columns, name_option
 from stickslip.readers.cut import FEWEST as PIECE
 from stickslip.readers.cut import RANGE, jumps
 from stickslip.record import encoder_step
@@ -56,7 +56,9 @@ def missing(view: View) -> Iterator[Finding]:
         message = f"{channel} has {bad.size} missing or infinite values ({100 * share:.3g} %)"
         if share > 0.2:
             without = (
-                "" if channel in ("time", "position") else f", or leave it out with --map {channel}=none"
+                ""
+                if channel in ("time", "position")
+                else f", or leave it out with {name_columns(**{channel: 'none'})}"
             )
             yield Finding("error", "nan", message, where, f"log it again{without}")
         else:
@@ -115,11 +117,11 @@ def _cut_off(view: View, channel: str, at: Mask, limits: str) -> Finding:
     if not many:
         return Finding(
             "warning", "saturation", message,
-            remedy=f"{remedy}, or leave these rows out with {' '.join(f'--leave-out {r}' for r in ranges)}",
+            remedy=f"{remedy}, or leave these rows out with {name_option('leave_out', *ranges)}",
         )  # fmt: skip
     begin, end = _longest_without(view, stretches, at.size)
     if end > begin:
-        part = f"--rows {number[begin]}:{number[end - 1]}"
+        part = name_option("rows", f"{number[begin]}:{number[end - 1]}")
         return Finding(
             "warning", "saturation", message, remedy=f"{remedy}, or use the longest part without, {part}"
         )
@@ -148,7 +150,7 @@ def _limited_command(channel: str, limits: str, unit: str, share: float) -> Find
         f"{channel} is commanded and stands at the drive's own limit of {limits} {unit} in {100 * share:.3g} % of the "
         "rows: this is what acts, nothing is lost"
     )
-    remedy = "keep these rows; where --loop gives the controller, give it this limit, too"
+    remedy = f"keep these rows; where {name_option('loop')} gives the controller, give it this limit, too"
     return Finding("note", "saturation", message, remedy=remedy)
 
 
@@ -225,8 +227,8 @@ def supply(view: View) -> Iterator[Finding]:
         message = (
             f"voltage stays between {low:.3g} and {high:.3g} V while the axis turns to and fro: the supply's"
         )
-        name = shlex.quote(f"supply={view.name('voltage')}")
-        yield Finding("warning", "supply-voltage", message, remedy=f"say --map {name} --map voltage=none")
+        remedy = f"say {name_columns(supply=view.name('voltage'), voltage='none')}"
+        yield Finding("warning", "supply-voltage", message, remedy=remedy)
 
 
 def repeated(view: View) -> Iterator[Finding]:
@@ -329,7 +331,7 @@ def wrapped(view: View) -> Iterator[Finding]:
             "position-wrap",
             f"position jumps {times(at.size)} by {size:.4g} {unit}: {_counted_within(size, unit, turn)}",
             row(index, view),
-            "say --unwrap to count it on, or log the position without overflow",
+            f"say {name_option('unwrap', True)} to count it on, or log the position without overflow",
         )
     else:
         yield Finding(
@@ -337,7 +339,8 @@ def wrapped(view: View) -> Iterator[Finding]:
             "position-jump",
             f"position jumps {times(at.size)} by about {size:.4g} {unit}",
             row(index, view),
-            f"leave these rows out, such as --leave-out {view.file_rows[index]}, or check the encoder",
+            f"leave these rows out, such as {name_option('leave_out', f'{view.file_rows[index]}')}, or check "
+            "the encoder",
         )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from stickslip.finding import Finding
 from stickslip.identify.doctor.view import Array, View, row
+from stickslip.messages import name_option
 from stickslip.readers.cut import range_words
 from stickslip.record import Record
 
@@ -58,7 +59,7 @@ def spikes(view: View) -> Iterator[Finding]:
         values, unit = view.record[channel], view.record.units[channel]
         message = f"{channel} has {_size_of(values, index, unit)}"
         rows = view.file_rows[index]
-        remedy = "leave them out with --leave-out spikes"
+        remedy = f"leave them out with {name_option('leave_out', 'spikes')}"
         if index.size <= NAMED:
             remedy += f", or by their rows: {range_words(rows)}"
         yield Finding("warning", "spikes", message, row(int(index[0]), view), remedy)

@@ -12,6 +12,7 @@ from stickslip.finding import Finding
 from stickslip.identify.doctor import units
 from stickslip.identify.doctor.view import View, is_number
 from stickslip.identify.experiment import TORQUES
+from stickslip.messages import name_columns, name_option
 from stickslip.readers.cut import file_rows, range_words, taken
 from stickslip.record import Record
 
@@ -42,7 +43,7 @@ def examine_table(record: Record) -> tuple[Record, list[Finding]]:
     findings += units.assumed(View(record))
     if len(record) > MOST:
         message = f"{len(record)} rows without times are more than a table of steady points has: a log"
-        remedy = "give their times with --map time=COLUMN:UNIT or --sample-time SECONDS"
+        remedy = f"give their times with {name_columns(time='COLUMN:UNIT')} or {name_option('sample_time', 'SECONDS')}"
         return record, [*findings, Finding("error", "no-clock", message, remedy=remedy)]
     torque = torque_in(record)
     velocity, effort = record["velocity"], record[torque]
@@ -83,12 +84,15 @@ def signs(velocity: Array, torque: Array) -> Iterator[Finding]:
             f"the torque is {forward:.4g} at positive velocities and {backward:.4g} at negative ones: friction would "
             "drive the axis"
         )
-        remedy = "if the torque is counted the other way, give --map torque=COLUMN:-UNIT"
+        remedy = f"if the torque is counted the other way, give {name_columns(torque='COLUMN:-UNIT')}"
         yield Finding("error", "torque-sign", message, remedy=remedy)
     elif abs(forward - backward) <= ALIKE * size and forward * backward > 0.0:
         message = (
             f"the torque is {forward:.4g} at positive velocities and {backward:.4g} at negative ones: a magnitude "
             "without its sign, or a constant torque far above friction"
         )
-        remedy = "give torques at negative velocities their sign; if it is right, --accept torque-magnitude"
+        remedy = (
+            "give torques at negative velocities their sign; if it is right, "
+            f"{name_option('accept', 'torque-magnitude')}"
+        )
         yield Finding("error", "torque-magnitude", message, remedy=remedy)

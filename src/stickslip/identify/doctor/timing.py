@@ -8,6 +8,7 @@ import numpy as np
 
 from stickslip.finding import Finding, times
 from stickslip.identify.doctor.view import View, row
+from stickslip.messages import name_option
 
 GAP = 5.0
 """A gap is this many times the usual distance of samples."""
@@ -42,11 +43,12 @@ def ascending(view: View) -> Iterator[Finding]:
         remedy = "sort the file by time"
         if longest.size >= FEWEST:
             first, last = view.file_rows[longest[[0, -1]]]
-            remedy = f"take a part, such as --rows {first}:{last}, or {remedy}"
+            remedy = f"take a part, such as {name_option('rows', f'{first}:{last}')}, or {remedy}"
         else:
             name = view.name("time")
             remedy += (
-                f", say which column is the time if {name!r} is not, or give --sample-time SECONDS if the rows follow"
+                f", say which column is the time if {name!r} is not, or give "
+                f"{name_option('sample_time', 'SECONDS')} if the rows follow"
                 " one another and only their times are wrong"
             )
         message = f"time goes back {times(back.size)}; {piece}"
@@ -56,7 +58,7 @@ def ascending(view: View) -> Iterator[Finding]:
         share = same.size / max(steps.size, 1)
         message = f"{same.size} rows ({100 * share:.3g} %) have the time of the row before"
         if share > 0.2:
-            remedy = "write the time with more digits, or give --sample-time SECONDS"
+            remedy = f"write the time with more digits, or give {name_option('sample_time', 'SECONDS')}"
             yield Finding(
                 "error",
                 "duplicate-time",
@@ -96,7 +98,8 @@ def sampling(view: View) -> Iterator[Finding]:
             "gap",
             message,
             row(int(rows[longest]), view),
-            f"filters smear what lies on both sides of a gap: identify with --to {end:.6g}, or --from {begin:.6g}",
+            f"filters smear what lies on both sides of a gap: identify with {name_option('end', f'{end:.6g}')}, "
+            f"or {name_option('start', f'{begin:.6g}')}",
         )
     # A run may end between two samples.
     whole = steps[:-1] if steps[-1] < usual else steps

@@ -17,6 +17,7 @@ import numpy as np
 from stickslip.finding import Finding
 from stickslip.identify.doctor.units import explained, in_counts
 from stickslip.identify.doctor.view import Array, View
+from stickslip.messages import name_columns, name_option
 
 LATE, EXPLAINS = 1.0, 0.5
 """Rows from which on a velocity is late: one that was differenced from row to row is half a row; and the share of its
@@ -240,8 +241,9 @@ def velocity_late(view: View) -> Iterator[Finding]:
         "note",
         "velocity-late",
         f"velocity {said} the derivative of position by {abs(late.time) * 1e3:.3g} ms ({abs(rows):.3g} rows): {why}",
-        remedy="an axis is identified by its position; --method breakaway takes the velocity, and derives it with "
-        "--map velocity=none",
+        remedy=f"an axis is identified by its position; {name_option('method', 'breakaway')} takes the "
+        "velocity, and derives it with "
+        f"{name_columns(velocity='none')}",
     )
 
 
@@ -253,7 +255,8 @@ def velocity_scale(view: View) -> Iterator[Finding]:
     follows = both.correlation
     if turned := follows < -FOLLOWS:
         remedy = (
-            f"say {view.mapped('velocity', '-')}, or say --map velocity=none to derive it from the position"
+            f"say {view.mapped('velocity', '-')}, or say {name_columns(velocity='none')} to derive it from the "
+            "position"
         )
         yield Finding(
             "error", "velocity-sign", "velocity is positive where the position falls", remedy=remedy
@@ -270,7 +273,7 @@ def velocity_scale(view: View) -> Iterator[Finding]:
         message = f"velocity does not follow the position (correlation {follows:.2f})"
         if not belongs:
             message += ", and its integral is another motion"
-        remedy = "check that both belong to one axis; --map velocity=none derives it from the position"
+        remedy = f"check that both belong to one axis; {name_columns(velocity='none')} derives it from the position"
         yield Finding("warning" if belongs else "error", "velocity-mismatch", message, remedy=remedy)
     elif both.alike:
         yield _another_unit(abs(sizes[0].middle), view)
@@ -286,7 +289,8 @@ def _another_unit(size: float, view: View) -> Finding:
         words = " or ".join(g[1] for g in guesses[:2])
         return Finding("error", guesses[0][0], f"{message}: {words}", remedy=f"say {guesses[0][2]}")
     remedy = (
-        "check both units, and whether one is on the other side of a gear: --gear-ratio N and, for the load's, --map "
-        "CHANNEL=COLUMN:UNIT@load"
+        f"check both units, and whether one is on the other side of a gear: {name_option('gear_ratio', 'N')} "
+        "and, for the load's, "
+        f"{name_columns(CHANNEL='COLUMN:UNIT@load')}"
     )
     return Finding("error", "velocity-mismatch", message, remedy=remedy)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,6 +15,7 @@ from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
 from stickslip.identify.experiment import Experiment
 from stickslip.identify.fit.filters import ZeroPhase, butterworth_poles
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import name_columns
 from stickslip.readers.cut import file_rows
 from stickslip.record import Record, encoder_step
 
@@ -165,7 +165,7 @@ class View:
         if unit == "-":
             own = self.columns[channel].unit if channel in self.columns else self.record.units[channel]
             unit = own[1:].lstrip() if own.startswith("-") else f"-{own}"
-        return "--map " + shlex.quote(f"{channel}={self.name(channel)}:{unit}")
+        return name_columns(**{channel: f"{self.name(channel)}:{unit}"})
 
     @property
     def from_current(self) -> bool:

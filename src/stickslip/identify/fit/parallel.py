@@ -7,6 +7,7 @@ import itertools
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import copy_context
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -39,7 +40,7 @@ def mapped(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
     given, helpers = list(items), _helpers()
     if len(given) < 2 or helpers is None:
         return [function(x) for x in given]
-    asked: list[Future[R]] = [helpers.submit(function, x) for x in given]
+    asked: list[Future[R]] = [helpers.submit(copy_context().run, function, x) for x in given]
     own: dict[int, R] = {}
     try:
         # From the end, where helpers come last.

@@ -27,6 +27,7 @@ from stickslip.identify.fit.levenberg_marquardt import (
 from stickslip.identify.fit.noise import Noise, as_noise, noise_of_fit, quantile
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.profile import Profiles, inverse_root, long_run, profiles_of
+from stickslip.messages import axis_unit
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -247,7 +248,7 @@ def verdict_on(p: Parameter, value: float, low: float, high: float, noise: Noise
         return "the data set no limit to it"
     if p.nonnegative:
         if low <= NOTHING * high:
-            return "the data do not distinguish it from 0"
+            return "cannot be distinguished from 0"
         if high > RATIO * low:
             return f"the interval spans a factor of {high / low:.3g}; identified means at most {RATIO:g}"
         return ""
@@ -259,7 +260,7 @@ def too_wide(half: float, unit: str, scale: float) -> str:
 
     A level that is not above 0 is no friction: it cannot measure the width of anything.
     """
-    torque = unit in ("N·m", "N")
+    torque, unit = unit in ("N·m", "N"), axis_unit(unit)
     if not 0.0 < scale < math.inf:
         level = "level of friction above 0" if torque else "size above 0"
         return f"no {level} was found with which its half-width of {half:.3g} {unit} can be compared"

@@ -18,6 +18,7 @@ from stickslip.identification.rows import sliding_rows
 from stickslip.identify.experiment import TORQUES, Experiment
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import name_option
 from stickslip.record import Record
 
 APART = 3
@@ -40,13 +41,17 @@ def coasting_points(records: Sequence[Record], inertia: float) -> tuple[SlidingP
         If the inertia is not positive, a torque acts, or the axis hardly slides.
     """
     if not 0.0 < inertia < math.inf:
-        raise InputError(f"--inertia {inertia:g} must be greater than 0 and finite, in kg·m² (kg)")
+        raise InputError(
+            f"{name_option('inertia', f'{inertia:g}')} must be greater than 0 and finite, in kg·m² (kg)"
+        )
     for record in records:
         for channel in TORQUES:
             if channel in record.channels and np.any(record[channel] != 0.0):
                 raise InputError(
-                    f"--method sliding --inertia is for an axis that coasts, and {channel} is not 0 throughout; select "
-                    "the coasting with --from and --to, or identify the axis with --method axis --inertia"
+                    f"{name_option('method', 'sliding')} {name_option('inertia')} is for an axis that coasts, "
+                    f"and {channel} is not 0 throughout; select "
+                    f"the coasting with {name_option('start')} and {name_option('end')}, or identify the axis "
+                    f"with {name_option('method', 'axis')} {name_option('inertia')}"
                 )
     points = reduce(add, (_points_of(record, inertia) for record in records))
     unit = "m/s" if records[0].units["position"] == "m" else "rad/s"

@@ -13,6 +13,7 @@ from stickslip.identify.experiment import DRIVES, Experiment, experiment_of
 from stickslip.identify.methods._records import MOTORS, with_extra
 from stickslip.identify.methods.method import Options
 from stickslip.machines.servo import Motor, ServoAxis
+from stickslip.messages import name_columns, name_option
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Loop
 
@@ -41,15 +42,16 @@ def refuse_unused(records: Sequence[Record], experiments: Sequence[Experiment], 
     for name in MOTORS:
         value = getattr(options, name)
         if value is not None and not quantities & {"current", "voltage"} and not derived:
-            unused.append(f"--{name.replace('_', '-')} {value:g}")
+            unused.append(name_option(name, f"{value:g}"))
     if options.resistance is not None and "voltage" not in quantities:
-        unused.append(f"--resistance {options.resistance:g}")
+        unused.append(name_option("resistance", f"{options.resistance:g}"))
     if unused:
-        instead = "; --drive-gain says all of it" if options.drive_gain is not None else ""
+        instead = f"; {name_option('drive_gain')} says all of it" if options.drive_gain is not None else ""
         made = ", the loop's output" if any(t.drive is None for t in experiments) else ""
         raise InputError(
             f"{' and '.join(unused)} would not be used: the drive's signal is a {' and a '.join(sorted(quantities))}"
-            f"{made}{instead}; leave it out, map the current or voltage (--map current=COLUMN), or say --loop-output"
+            f"{made}{instead}; leave it out, map the current or voltage ({name_columns(current='COLUMN')}), or "
+            f"say {name_option('loop_output')}"
         )
 
 
@@ -76,8 +78,9 @@ def motor_constant(record: Record, options: Options, linear: bool) -> float | No
     """
     if options.force_constant is not None and not linear:
         raise InputError(
-            f"--force-constant {options.force_constant:g} is a linear motor's, and the record's positions are angles; "
-            "leave it out, or give --torque-constant NM_PER_A"
+            f"{name_option('force_constant', f'{options.force_constant:g}')} is a linear motor's, and the "
+            "record's positions are angles; "
+            f"leave it out, or give {name_option('torque_constant', 'NM_PER_A')}"
         )
     known = record.meta.get("reading", {}).get("drive", {})  # a profile's, too
     said = [getattr(options, name) for name in MOTORS]
@@ -91,17 +94,23 @@ def experiment(record: Record, axis: ServoAxis, options: Options) -> Experiment:
     loop = str(record.meta.get("loop", ""))
     if loop and not {"position_reference", "reference"} & set(record.channels):
         raise InputError(
-            f"{name}: --loop needs the reference position beside {', '.join(record.channels)}; map its column with "
-            "--map position_reference=COLUMN, or leave --loop out"
+            f"{name}: {name_option('loop')} needs the reference position beside {', '.join(record.channels)}; "
+            "map its column with "
+            f"{name_columns(position_reference='COLUMN')}, or leave {name_option('loop')} out"
         )
     recorded = bool(set(DRIVES) & set(record.channels))
     output = options.loop_output or ("torque" if options.resistance is None else "voltage")
     if recorded or output != "voltage":  # a signal in V or A is what it is, whatever supplies it
         record = replace(record, channels={k: v for k, v in record.channels.items() if k != "supply"})
     if options.extra_torque and (loop or "motor_torque" not in record.channels):
-        why = "the loop that --loop simulates would not make it" if loop else "no torque is recorded"
+        why = (
+            f"the loop that {name_option('loop')} simulates would not make it"
+            if loop
+            else "no torque is recorded"
+        )
         raise InputError(
-            f"--extra-torque {options.extra_torque} is added to the recorded torque, but {why}; leave one out"
+            f"{name_option('extra_torque', options.extra_torque)} is added to the recorded torque, but {why}; "
+            "leave one out"
         )
     record = with_extra(record, options.extra_torque, "motor_torque")
     return experiment_of(record, axis, loop=loop_of(loop) if loop else None, name=name, output=output)
@@ -112,15 +121,18 @@ def loop_of(given: str | Mapping[str, float | ReferenceVelocity]) -> Loop:
     numbers, reference_velocity = split_loop(given)
     if reference_velocity == "instant":
         raise InputError(
-            "--loop: reference_velocity = instant is not in a record, whose reference is known at its rows only: the "
+            f"{name_option('loop')}: reference_velocity = instant is not in a record, whose reference is known "
+            "at its rows only: the "
             "loop is simulated with the difference of two rows; leave it out"
         )
     kind_of_loop(numbers, BESIDE_GAINS)
     for name, value in numbers.items():
         above = math.isfinite(value) or name == "limit"
         if not above or (name in NOT_NEGATIVE and value < 0.0) or (name == "limit" and not value > 0.0):
-            raise InputError(f"--loop: {name} = {value:g} must be {RANGES.get(name, 'a finite number')}")
+            raise InputError(
+                f"{name_option('loop')}: {name} = {value:g} must be {RANGES.get(name, 'a finite number')}"
+            )
     span = numbers.pop("span", 1.0)
     if span not in (1.0, 2.0):
-        raise InputError(f"--loop: span = {span:g} must be 1 or 2 samples")
+        raise InputError(f"{name_option('loop')}: span = {span:g} must be 1 or 2 samples")
     return Loop(velocity_span=int(span), **numbers)

@@ -10,6 +10,7 @@ from stickslip import plugins
 from stickslip.errors import InputError, UnknownName
 from stickslip.identify.experiment import TORQUES
 from stickslip.identify.methods.method import Options
+from stickslip.messages import name_columns, name_option, name_parameter
 from stickslip.model import Model
 from stickslip.record import Record
 
@@ -28,8 +29,8 @@ def torque_channel(records: Sequence[Record], options: Options, method: str) -> 
         if all(name in channels for channels in have):
             return name
     raise InputError(
-        f"{method} needs a torque in every record; map a column with --map torque=COLUMN:UNIT, or give "
-        "--torque-constant for a current (of a linear motor --force-constant)"
+        f"{method} needs a torque in every record; map a column with {name_columns(torque='COLUMN:UNIT')}, or give "
+        f"{name_option('torque_constant')} for a current (of a linear motor {name_option('force_constant')})"
     )
 
 
@@ -44,12 +45,13 @@ def with_extra(record: Record, extra: str, torque: str) -> Record:
     if not extra:
         return record
     if extra not in record.channels:
-        raise UnknownName("channel of --extra-torque", extra, sorted(record.channels))
+        raise UnknownName(f"channel of {name_option('extra_torque')}", extra, sorted(record.channels))
     units = record.units[torque], record.units[extra]
     if extra == torque or units[0] != units[1]:
         why = "that torque itself" if extra == torque else f"in {units[1]}"
         raise InputError(
-            f"--extra-torque {extra} is added to {torque}, in {units[0]}, but it is {why}; name another channel"
+            f"{name_option('extra_torque', extra)} is added to {torque}, in {units[0]}, but it is {why}; name "
+            "another channel"
         )
     return replace(record, channels={**record.channels, torque: record[torque] + record[extra]})
 
@@ -72,8 +74,8 @@ def refuse_idle_motor(records: Sequence[Record], options: Options) -> None:
     for name in MOTORS:
         if (value := getattr(options, name)) is not None:
             raise InputError(
-                f"--{name.replace('_', '-')} {value:g} would not be used: the torque is recorded; leave it out, or "
-                "map the current alone (--map current=COLUMN --map motor_torque=none)"
+                f"{name_option(name, f'{value:g}')} would not be used: the torque is recorded; leave it out, or "
+                f"map the current alone ({name_columns(current='COLUMN', motor_torque='none')})"
             )
 
 
@@ -108,12 +110,14 @@ def known_curve(options: Options, method: str, own: Sequence[str]) -> Model:
     known = [f.name for f in law.fields if not f.per_element]
     for name in given:
         if name not in known:
-            raise UnknownName(f"value for --method {method}", name, [*own, *known])
+            raise UnknownName(f"value for {name_option('method', method)}", name, [*own, *known])
     missing = [f.name for f in law.fields if f.name not in {**values, **given} and f.par.default is None]
     if options.model is None and {"fs", "fc", "vs"} & set(missing):
         raise InputError(
-            f"--method {method} needs the sliding curve, which lacks {', '.join(missing)}; identify it with "
-            "--method sliding and give --model model.toml, or --set fs=..,  --set fc=.. and --set vs=.."
+            f"{name_option('method', method)} needs the sliding curve, which lacks {', '.join(missing)}; "
+            "identify it with "
+            f"{name_option('method', 'sliding')} and give {name_option('model', 'model.toml')}, or "
+            f"{name_parameter('fs')}, {name_parameter('fc')} and {name_parameter('vs')}"
         )
     return Model(law, {}, **{**values, **given})
 
@@ -129,5 +133,7 @@ def without_constant_torque(record: Record, channel: str, options: Options) -> R
 def single(records: Sequence[Record], method: str) -> Record:
     """The one record that a method takes."""
     if len(records) != 1:
-        raise InputError(f"--method {method} takes one record, not {len(records)}; run it for each")
+        raise InputError(
+            f"{name_option('method', method)} takes one record, not {len(records)}; run it for each"
+        )
     return records[0]

@@ -10,6 +10,7 @@ from stickslip.identify.methods._records import has_torque, single, with_torque,
 from stickslip.identify.methods.method import TORQUE, Method, Options
 from stickslip.identify.presliding.attraction import identify_attraction
 from stickslip.identify.presliding.hysteresis import Loop
+from stickslip.messages import name_columns, name_option
 from stickslip.record import Record
 
 
@@ -18,11 +19,15 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     record, model = single(records, "attraction"), options.model
     if model is None or model.law.name != "gms":
         raise InputError(
-            "--method attraction needs a GMS law with its elements; identify it with --method presliding and give "
-            "--model model.toml"
+            f"{name_option('method', 'attraction')} needs a GMS law with its elements; identify it with "
+            f"{name_option('method', 'presliding')} and give "
+            f"{name_option('model', 'model.toml')}"
         )
     if "velocity" not in record.channels:
-        raise InputError("--method attraction needs the velocity; map a column with --map velocity=COLUMN")
+        raise InputError(
+            f"{name_option('method', 'attraction')} needs the velocity; map a column with "
+            f"{name_columns(velocity='COLUMN')}"
+        )
     (record,), channel = with_torque([record], options, "attraction")
     loop = Loop.of(without_constant_torque(record, channel, options), channel, "velocity")
     return identify_attraction(loop, model, noise=options.noise)

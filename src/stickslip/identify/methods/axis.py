@@ -22,6 +22,7 @@ from stickslip.identify.methods._play import with_dead_travel
 from stickslip.identify.methods.method import AXIS, Method, Options, law_of, refuse_unsaid
 from stickslip.identify.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import name_option, name_parameter
 from stickslip.record import Record
 
 
@@ -75,12 +76,14 @@ BEHIND = {"commanded": -0.5, "actual": 0.0, "mean": 0.5}
 """Rows by which a column lies behind the torque: a command acts half a row after its row, on average, and a mean over
 the row before acted half a row before it."""
 TAKEN = (
-    "With --delay alone the torque column counts as commanded from its row to the next (--torque-is commanded); say "
+    f"With {name_option('delay')} alone the torque column counts as commanded from its row to the next "
+    f"({name_option('torque_is', 'commanded')}); say "
     "what it is if it is another."
 )
 ALONE = (
-    "--torque-is alone does not say how late the torque acted (the delay of a current loop): that is found from the "
-    "record. Give --delay as well to hold both, 0 where it acted at once."
+    f"{name_option('torque_is')} alone does not say how late the torque acted (the delay of a current loop): "
+    "that is found from the "
+    f"record. Give {name_option('delay')} as well to hold both, 0 where it acted at once."
 )
 
 
@@ -159,15 +162,18 @@ def refuse_held(options: Options) -> None:
     others = [law for law in (x if isinstance(x, str) else x.name for x in options.laws) if law != "coulomb"]
     if others:
         raise InputError(
-            f"the plain inverse dynamics (--inverse) fits law coulomb only, not {', '.join(others)}; leave out "
-            "--inverse, or --law"
+            f"the plain inverse dynamics ({name_option('inverse', True)}) fits law coulomb only, not "
+            f"{', '.join(others)}; leave out "
+            f"{name_option('inverse', True)}, or {name_option('law')}"
         )
     if started := [name for name in options.values if name not in options.frozen]:
         raise InputError(
-            f"the plain inverse dynamics (--inverse) has no start: --set {started[0]} would be ignored; leave it out"
+            f"the plain inverse dynamics ({name_option('inverse', True)}) has no start: "
+            f"{name_parameter(started[0])} would be ignored; leave it out"
         )
     if options.frozen:
         raise InputError(
-            f"the plain inverse dynamics (--inverse) fits every number: {', '.join(options.frozen)} cannot be held "
-            "there; leave out --inverse, or the value that is known"
+            f"the plain inverse dynamics ({name_option('inverse', True)}) fits every number: "
+            f"{', '.join(options.frozen)} cannot be held "
+            f"there; leave out {name_option('inverse', True)}, or the value that is known"
         )

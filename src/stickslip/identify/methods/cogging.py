@@ -10,6 +10,7 @@ from stickslip.identify.estimate import Identification
 from stickslip.identify.experiment import TORQUES
 from stickslip.identify.methods._records import with_extra
 from stickslip.identify.methods.method import TORQUE, Method, Options
+from stickslip.messages import name_columns, name_option, name_parameter
 from stickslip.record import Record
 
 GEAR = "gear_ratio"
@@ -24,8 +25,8 @@ def channel_of(records: Sequence[Record], options: Options) -> str:
     if options.torque:
         raise UnknownName("channel", options.torque, sorted(set[str]().union(*have)))
     raise InputError(
-        "cogging needs a torque or a current in every record; map a column with --map current=COLUMN:A or "
-        "--map torque=COLUMN:UNIT"
+        f"cogging needs a torque or a current in every record; map a column with {name_columns(current='COLUMN:A')} or "
+        f"{name_columns(torque='COLUMN:UNIT')}"
     )
 
 
@@ -40,11 +41,12 @@ def gear_of(options: Options) -> float:
     """Turns of the position's shaft for one of the slowest."""
     for name in options.values:
         if name != GEAR:
-            raise UnknownName("value of --method cogging", name, (GEAR,))
+            raise UnknownName(f"value of {name_option('method', 'cogging')}", name, (GEAR,))
     gear = float(options.values.get(GEAR, 1.0))
     if not gear >= 1.0:
         raise InputError(
-            f"--set {GEAR}={gear:g} must be at least 1: turns of the position's shaft for one of the slowest"
+            f"{name_parameter(GEAR, f'{gear:g}')} must be at least 1: turns of the position's shaft for one of "
+            "the slowest"
         )
     return gear
 

@@ -12,6 +12,7 @@ from stickslip.identify.estimate import Identification
 from stickslip.identify.methods._records import has_torque, single, with_torque
 from stickslip.identify.methods.method import TORQUE, Method, Options
 from stickslip.identify.presliding.hysteresis import Loop, choose_hysteresis, templates_for
+from stickslip.messages import name_option
 from stickslip.record import Record
 
 ROWS = 8000
@@ -29,7 +30,7 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     asked = [law if isinstance(law, str) else law.name for law in options.laws]
     for law in asked:
         if law not in names:
-            raise UnknownName("law of --method hysteresis", law, names)
+            raise UnknownName(f"law of {name_option('method', 'hysteresis')}", law, names)
     wanted = {k: m for k, m in templates.items() if not asked or m.law.name in asked}
     chosen, found, table = choose_hysteresis(loop, wanted)
     said = [

@@ -15,6 +15,7 @@ from stickslip.identify.methods._records import (
 )
 from stickslip.identify.methods.method import TORQUE, Method, Options
 from stickslip.identify.presliding.lugre_dynamics import Response, identify_lugre_dynamics
+from stickslip.messages import name_option, name_parameter
 from stickslip.record import Record
 
 OWN = ("inertia", "offset")
@@ -25,7 +26,9 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
     """sigma0 and sigma1 of one response; the inertia is among the values."""
     record = single(records, "lugre")
     if "inertia" not in options.values:
-        raise InputError("--method lugre needs the inertia in kg·m²; give --set inertia=...")
+        raise InputError(
+            f"{name_option('method', 'lugre')} needs the inertia in kg·m²; give {name_parameter('inertia')}"
+        )
     curve = known_curve(options, "lugre", OWN)
     (record,), channel = with_torque([record], options, "lugre")
     response = Response.of(without_constant_torque(record, channel, options), channel)

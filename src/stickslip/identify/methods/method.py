@@ -13,6 +13,7 @@ from stickslip.errors import InputError
 from stickslip.identification.memo import EstimateSliding
 from stickslip.identification.sliding import estimate_sliding
 from stickslip.identify.estimate import Identification, silent
+from stickslip.messages import name_option, name_parameter
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.spec import Law
@@ -79,27 +80,27 @@ class Options:
     model_offset: float = 0.0
 
     def __post_init__(self) -> None:
-        for option, count in (("harmonics", self.harmonics), ("elements", self.elements)):
+        for name, count in (("harmonics", self.harmonics), ("elements", self.elements)):
             if count < 0:
-                raise InputError(f"--{option} {count} must be 0 or more")
+                raise InputError(f"{name_option(name, count)} must be 0 or more")
         if self.position_map and self.harmonics:
             raise InputError(
-                f"--position chooses its orders by itself, --harmonics {self.harmonics} gives them; leave one out"
+                f"{name_option('position_map')} chooses its orders by itself, "
+                f"{name_option('harmonics', self.harmonics)} gives them; leave one out"
             )
-        for option, value in (("noise", self.noise), ("threshold", self.threshold)):
+        for name, value in (("noise", self.noise), ("threshold", self.threshold)):
             if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise InputError(f"--{option} {value:g} must be greater than 0")
+                raise InputError(f"{name_option(name, f'{value:g}')} must be greater than 0")
         if self.delay is not None and not (math.isfinite(self.delay) and abs(self.delay) < LONGEST_DELAY):
             raise InputError(
-                f"--delay {self.delay:g} s, the time until the torque acts (below 0 where its column lies behind it), "
+                f"{name_option('delay', f'{self.delay:g}')} s, the time until the torque acts (below 0 where "
+                "its column lies behind it), "
                 "must lie between -1 and 1 s; it is in s and not in samples: two at 1 kHz are 0.002"
             )
 
 
-OWN_FLAGS = {
-    "laws": "law", "values": "set", "frozen": "freeze", "held_out": "hold-out", "position_map": "position",
-}  # fmt: skip
-"""Options whose name on the command line is another than that of their field."""
+ARGUMENTS = {"laws": "law", "held_out": "hold_out", "torque": "torque_channel"}
+"""Arguments that have another name than the field of `Options`."""
 OF_EVERY_METHOD = ("torque_constant", "force_constant", "model_offset", "estimate", "progress")
 """Fields that no method refuses: how a log is read, and how it is computed."""
 AXIS = frozenset({"pendulum", "drive_gain", "resistance", "loop", "loop_output", "extra_torque"})
@@ -108,9 +109,9 @@ TORQUE = frozenset({"torque", "extra_torque"})
 """Options of every method that reads a torque from records."""
 
 
-def flag_of(option: str) -> str:
-    """Return what the command line calls an option."""
-    return f"--{OWN_FLAGS.get(option, option).replace('_', '-')}"
+def name_field(field_name: str) -> str:
+    """Refer to the option that a field of `Options` is from."""
+    return name_option(ARGUMENTS.get(field_name, field_name))
 
 
 def given_in(options: Options, *, inertia: bool, loop: bool, hold_out: bool) -> tuple[str, ...]:
@@ -185,11 +186,13 @@ class Method:
             if name not in self.uses:
                 others = elsewhere.get(name, ())
                 by = f" (methods that do: {', '.join(others)})" if others else ""
-                raise InputError(f"--method {self.name} does not use {flag_of(name)}{by}; leave it out")
+                raise InputError(
+                    f"{name_option('method', self.name)} does not use {name_field(name)}{by}; leave it out"
+                )
         for narrowing, uses in self.narrowed.items():
             unused = [name for name in given if name not in uses] if narrowing in given else []
             if unused:
-                one, other = flag_of(narrowing), flag_of(unused[0])
+                one, other = name_field(narrowing), name_field(unused[0])
                 raise InputError(f"{one} does not use {other}; leave out one of them")
 
     def refuse_unknown(self, options: Options) -> None:
@@ -202,11 +205,12 @@ class Method:
         if self.values is None:
             return
         takes = f"; it takes {', '.join(self.values)}" if self.values else ""
-        for option, names in (("set", options.values), ("free", options.free), ("freeze", options.frozen)):
+        for option, names in (("values", options.values), ("free", options.free), ("frozen", options.frozen)):
             for name in names:
-                if option != "set" or name not in self.values:
+                if option != "values" or name not in self.values:
                     raise InputError(
-                        f"--method {self.name} has no {name!r} for --{option}{takes}; leave it out"
+                        f"{name_option('method', self.name)} has no {name!r} for {name_option(option)}{takes}; "
+                        "leave it out"
                     )
 
 
@@ -228,7 +232,7 @@ def refuse_unsaid(options: Options, known: Set[str]) -> None:
         n for n in options.frozen if given.isdisjoint((n, n.partition("[")[0], n.removesuffix(NEGATIVE)))
     ]
     if unsaid:
-        settings = " and ".join(f"--set {name}=.." for name in unsaid)
+        settings = " and ".join(name_parameter(name) for name in unsaid)
         raise InputError(f"{', '.join(unsaid)} cannot be held without a value; give {settings}")
 
 

@@ -19,12 +19,16 @@ from stickslip.identify.sliding.choice import candidates, choose_sliding, compar
 from stickslip.identify.sliding.curve import Array, identify_sliding
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.identify.sliding.segments import sliding_points
+from stickslip.messages import name_option
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.spec import Law
 
 FEW = "Coulomb with viscous friction was fitted: these points are too few to choose among several curves."
-PER_DIRECTION = "Friction of each direction includes any constant torque: --per-direction holds offset at 0."
+PER_DIRECTION = (
+    f"Friction of each direction includes any constant torque: {name_option('per_direction', True)} "
+    "holds offset at 0."
+)
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
@@ -80,7 +84,8 @@ def points_in(records: Sequence[Record], torque: str) -> tuple[SlidingPoints, tu
         return sliding_points(records, torque=torque)
     if len(tables) < len(records):
         raise InputError(
-            "--method sliding takes either logs with times or tables of steady points; give them apart"
+            f"{name_option('method', 'sliding')} takes either logs with times or tables of steady points; give "
+            "them apart"
         )
     velocity, effort = (np.concatenate([r[name] for r in tables]) for name in ("velocity", torque))
     linear = tables[0].units["velocity"] == "m/s"
@@ -102,7 +107,8 @@ def known_offset(points: SlidingPoints, options: Options) -> float | None:
     """
     if options.per_direction and points.one_way:
         raise InputError(
-            "--per-direction needs constant velocities in both directions, and the record has one; leave it out, or "
+            f"{name_option('per_direction', True)} needs constant velocities in both directions, and the record "
+            "has one; leave it out, or "
             "move in both directions"
         )
     if "offset" in options.frozen and "offset" in options.values:
@@ -121,10 +127,11 @@ def refuse_unknown(options: Options, templates: Iterable[Model]) -> None:
     names = {"offset", *(f.name for model in templates for f in model.law.fields)}
     for name in (*(set(options.values) - {"inertia"}), *options.frozen):
         if name.partition("[")[0] not in names:
-            raise UnknownName("parameter of --method sliding", name, names)
+            raise UnknownName(f"parameter of {name_option('method', 'sliding')}", name, names)
     for name in options.free:
         raise InputError(
-            f"--method sliding fits every parameter; leave --free {name} out, or --freeze the others"
+            f"{name_option('method', 'sliding')} fits every parameter; leave {name_option('free', name)} out, "
+            f"or {name_option('frozen')} the others"
         )
     refuse_unsaid(options, {n for model in templates for n in frozen_by_default(model.law)})
 

@@ -17,6 +17,7 @@ from stickslip.errors import InputError
 from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.identify.fit.noise import Noise, as_noise
 from stickslip.identify.presliding.hysteresis import Loop, correlation_lags, curve_of, fit_loop, loop_misfit
+from stickslip.messages import axis_unit
 from stickslip.model import Model
 from stickslip.simulation.prescribed.motion import Along
 
@@ -77,13 +78,17 @@ def identify_attraction(loop: Loop, template: Model, *, noise: Noise | float | N
     curve = curve_of(along, found.vector, found.u)
     traces = (Trace("measured", v, loop.torque[rows], "dense"), Trace("GMS", v, curve[rows]))
     best, *_ = found.estimates
-    said = f"C = {best.value:.4g} N·m/s" if best.identified else f"C is not identified: {best.verdict}"
+    said = (
+        f"C = {best.value:.4g} {axis_unit('N·m/s')}"
+        if best.identified
+        else f"C is not identified: {best.verdict}"
+    )
     picture = Picture(
         "attraction",
         "Lag of friction in sliding",
         said,
-        "velocity (rad/s)",
-        f"friction torque ({loop.unit[1]})",
+        f"velocity ({axis_unit('rad/s')})",
+        f"friction torque ({axis_unit(loop.unit[1])})",
         traces,
     )
     return Identification(

@@ -18,6 +18,7 @@ from stickslip.errors import InputError
 from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.sliding.levels import slope_of
+from stickslip.messages import axis_unit, name_option
 from stickslip.record import Record, encoder_step
 
 WINDOW = 0.02
@@ -163,7 +164,8 @@ def identify_breakaway(
     step = max(encoder_step(r[torque]) for r in several)
     if not breaks:
         raise InputError(
-            f"the axis never breaks away: its velocity does not pass {threshold:g} rad/s from rest; ramp the "
+            f"the axis never breaks away: its velocity does not pass {threshold:g} {axis_unit('rad/s')} from "
+            "rest; ramp the "
             "torque higher or lower the threshold"
         )
     ramps = sum(b.ramped for b in breaks)
@@ -179,7 +181,9 @@ def identify_breakaway(
     rate = rate_effect(breaks)
     if rate is not None:
         estimates.append(rate)
-    notes = [f"{len(breaks)} break-aways from channel {torque!r}, velocity threshold {threshold:g} rad/s."]
+    notes = [
+        f"{len(breaks)} break-aways from channel {torque!r}, velocity threshold {threshold:g} {axis_unit('rad/s')}."
+    ]
     if len(every) > len(breaks):
         notes.append(
             f"{len(every) - len(breaks)} more, where the axis stuck again and slipped while the torque rose on, are "
@@ -188,7 +192,9 @@ def identify_breakaway(
     if 2 * ramps < len(breaks):
         estimates = [replace(e, identified=False, verdict="few torque ramps from rest") for e in estimates]
     elif rate is not None and (rate.lower > 0.0 or rate.upper < 0.0):
-        notes.append(f"Break-away depends on the ramp rate: {rate.value:.3g} N·m per tenfold rate.")
+        notes.append(
+            f"Break-away depends on the ramp rate: {rate.value:.3g} {axis_unit('N·m')} per tenfold rate."
+        )
     notes += ramp_notes(len(breaks), ramps) + count_notes(several, threshold)
     few = tuple(["Repeat the ramp at other angles; one break-away has no spread."] if len(breaks) < 3 else [])
     return Identification(
@@ -205,7 +211,8 @@ def ramp_notes(found: int, ramps: int) -> list[str]:
         return [f"{found - ramps} of them followed no torque ramp from rest, and may lie elsewhere."]
     return [
         f"Only {ramps} of them followed a torque ramp from rest, so that nothing counts as identified: is it the "
-        "record of a motion? Then take --method axis. In a break-away record the torque rises slowly while the "
+        f"record of a motion? Then take {name_option('method', 'axis')}. In a break-away record the torque "
+        "rises slowly while the "
         "axis rests until it moves, then goes back until it rests (`stickslip rig run breakaway`). Where it was ramped "
         f"from a torque held, less than {1.0 - RAMP:.0%} of the break-away torque is to be held for it to count."
     ]
@@ -219,7 +226,7 @@ def count_notes(records: Sequence[Record], threshold: float) -> list[str]:
         return []
     return [
         f"Fewer than {COUNTS:g} counts of the encoder within {WINDOW:g} s pass the threshold, so that creep or noise "
-        f"may be taken for a break-away: try --threshold {enough:.2g}."
+        f"may be taken for a break-away: try {name_option('threshold', f'{enough:.2g}')}."
     ]
 
 
@@ -283,6 +290,8 @@ def angle_picture(breaks: Sequence[Break], estimates: Sequence[Estimate]) -> Pic
     means = [e for e in estimates if e.name.startswith("fs_")]
     for e in means:
         traces.append(Trace(f"mean, {e.name[3:]}", ends, np.full(2, e.value)))
-    words = ", ".join(f"{e.name[3:]} {e.value:.4g} N·m" for e in means)
-    return Picture("breakaway", "Break-away torque", f"Mean: {words}", "angle (degrees)", "break-away torque (N·m)",
-                   tuple(traces))  # fmt: skip
+    words = ", ".join(f"{e.name[3:]} {e.value:.4g} {axis_unit('N·m')}" for e in means)
+    label = f"break-away torque ({axis_unit('N·m')})"
+    return Picture(
+        "breakaway", "Break-away torque", f"Mean: {words}", "angle (degrees)", label, tuple(traces)
+    )  # fmt: skip

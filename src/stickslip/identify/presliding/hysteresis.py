@@ -19,6 +19,7 @@ from stickslip.identify.estimate import Identification, Picture, Trace
 from stickslip.identify.fit.noise import Noise
 from stickslip.identify.fit.parameter_vector import Parameter, Vector
 from stickslip.identify.fit.uncertainty import Fit, fit
+from stickslip.messages import axis_unit
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.simulation.prescribed.motion import Along
@@ -134,8 +135,10 @@ def fit_loop(
     idle = idle_parameters(seen, vector, rows)
     if len(idle) == vector.size - len(extra):
         raise InputError(
-            f"along this motion, of {np.ptp(loop.position):.3g} {loop.unit[0]}, no parameter of {template.law.name!r} "
-            f"acts where the search starts, at {level:.3g} {loop.unit[1]} of friction; check the values and units given"
+            f"along this motion, of {np.ptp(loop.position):.3g} {axis_unit(loop.unit[0])}, no parameter of "
+            f"{template.law.name!r} "
+            f"acts where the search starts, at {level:.3g} {axis_unit(loop.unit[1])} of friction; check the "
+            "values and units given"
         )
     if idle:
         vector = Vector(template, frozen=[*frozen, *idle], extra=extra)
@@ -352,5 +355,5 @@ def loop_picture(loop: Loop, curve: Array, rows: Rows, rest: Rows, template: Mod
     quantity = "force" if loop.unit[1] == "N" else "torque"
     return Picture(
         "hysteresis", f"Hysteresis: {template.law.title}", words[0].upper() + words[1:],
-        f"displacement ({loop.unit[0]})", f"friction {quantity} ({loop.unit[1]})", traces,
+        f"displacement ({axis_unit(loop.unit[0])})", f"friction {quantity} ({axis_unit(loop.unit[1])})", traces,
     )  # fmt: skip

@@ -10,6 +10,7 @@ from stickslip import plugins
 from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
 from stickslip.friction_levels import end_of_slope, levels_of, static_level
+from stickslip.messages import name_option
 from stickslip.model import Model
 
 SLIDING = ("curve", "viscous", "symmetry", "position_dependence")
@@ -37,7 +38,8 @@ def transfer_curve(law: str, curve: Model, **own: Any) -> Model:
     """
     if curve.law.steady is None:
         raise InputError(
-            f"law {curve.law.name!r} has no torque at constant velocity; identify a sliding curve with --method sliding"
+            f"law {curve.law.name!r} has no torque at constant velocity; identify a sliding curve with "
+            f"{name_option('method', 'sliding')}"
         )
     if not min(static_levels(curve)) > 0.0:
         raise InputError(

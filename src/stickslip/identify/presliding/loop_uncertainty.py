@@ -20,6 +20,7 @@ from stickslip.identify.fit.profile import inverse_information
 from stickslip.identify.fit.student import student_quantile
 from stickslip.identify.fit.uncertainty import RATIO, SHARE, Fit
 from stickslip.identify.presliding.hysteresis import Loop, Rows, correlation_lags, fit_loop
+from stickslip.messages import axis_unit
 from stickslip.record import encoder_step
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -151,5 +152,8 @@ def widen_interval(e: Estimate, extra: float, positive: bool, level: float) -> E
         high = min(high, 1.0)
     why = e.verdict
     if e.identified and wide:
-        why = f"cycles that differ, half a row of lag, or counts leave it between {low:.3g} and {high:.3g} {e.unit}"
+        why = (
+            f"cycles that differ, half a row of lag, or counts leave it between {low:.3g} and {high:.3g} "
+            f"{axis_unit(e.unit)}"
+        )
     return replace(e, std=std, lower=low, upper=high, identified=e.identified and not wide, verdict=why)

@@ -14,6 +14,7 @@ import numpy as np
 
 from stickslip.identify.estimate import Picture, Trace
 from stickslip.identify.fit.uncertainty import Fit
+from stickslip.messages import axis_unit
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -58,13 +59,14 @@ def plain_verdict(scan: Array, sigma0: float) -> tuple[bool, str]:
         side = "grows" if best else "shrinks"
         return False, (
             "Plain least squares on the position does not determine sigma0 and sigma1: the misfit falls as "
-            f"sigma0 {side}, to {finite[best, 1]:.3g} rad at {finite[best, 0]:.3g} N·m/rad, the last value "
+            f"sigma0 {side}, to {finite[best, 1]:.3g} {axis_unit('rad')} at {finite[best, 0]:.3g} "
+            f"{axis_unit('N·m/rad')}, the last value "
             "tried. Gross sliding dominates it; sigma0 comes from the pre-sliding parts, weighted for themselves."
         )
     if not (near[0] <= sigma0 <= near[-1]) or near[-1] > 2.0 * near[0]:
         return False, (
             "Plain least squares on the position does not determine sigma0 and sigma1: misfits within 10 % of "
-            f"the least reach from sigma0 = {near[0]:.3g} to {near[-1]:.3g} N·m/rad; "
+            f"the least reach from sigma0 = {near[0]:.3g} to {near[-1]:.3g} {axis_unit('N·m/rad')}; "
             f"the pre-sliding parts say {sigma0:.3g}."
         )
     return (
@@ -82,8 +84,9 @@ def response_picture(time: Array, measured: Array, simulated: Array) -> Picture:
     time, origin = time - time[0], measured[0]
     traces = (Trace("measured", time, measured - origin), Trace("LuGre", time, simulated - origin))
     return Picture(
-        "lugre-response", "Open-loop response", f"Root mean square difference {1e3 * error:.3g} mrad", "time (s)",
-        "position (rad)", traces,
+        "lugre-response", "Open-loop response", f"Root mean square difference {1e3 * error:.3g} "
+            f"m{axis_unit('rad')}", "time (s)",
+        f"position ({axis_unit('rad')})", traces,
     )  # fmt: skip
 
 
@@ -96,5 +99,5 @@ def scan_picture(scan: Array, sigma0: float) -> Picture:
     return Picture(
         "lugre-misfit", "What the whole position says about the stiffness",
         "A curve without a minimum near the vertical line does not determine sigma0",
-        "sigma0 (N·m/rad)", "RMS position misfit (rad)", traces, "log",
+        f"sigma0 ({axis_unit('N·m/rad')})", f"RMS position misfit ({axis_unit('rad')})", traces, "log",
     )  # fmt: skip

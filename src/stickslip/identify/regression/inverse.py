@@ -22,6 +22,7 @@ from stickslip.identify.experiment import Experiment, evenly_spaced, insist_on_m
 from stickslip.identify.fit.filters import decimated, low_pass, spectrum
 from stickslip.identify.fit.profile import inverse_information, long_run
 from stickslip.machines.servo import ServoAxis
+from stickslip.messages import name_frozen, name_option
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -206,7 +207,11 @@ def _undetermined(names: Sequence[str], w: Array, size: Array) -> str:
 
 def _level(tied: str) -> str:
     """Return what else separates friction from a constant torque, to end an error about both; else an empty text."""
-    return ", or give --freeze offset=0 if no constant torque acts (a level axis)" if "offset" in tied else ""
+    return (
+        f", or give {name_frozen('offset', 0)} if no constant torque acts (a level axis)"
+        if "offset" in tied
+        else ""
+    )
 
 
 def refuse_harmonics(experiments: Sequence[Experiment], harmonics: int, *, simulated: bool = False) -> None:
@@ -242,7 +247,7 @@ def refuse_harmonics(experiments: Sequence[Experiment], harmonics: int, *, simul
         most = (math.sqrt(3600.0 * MOST_HOURS / SECONDS / samples) - OTHERS) / 2.0
         raise InputError(
             f"{harmonics} harmonics over {samples} samples would take about {hours:.2g} h; give at most "
-            f"{max(0, math.floor(most))} (a day), or --inverse, which simulates nothing"
+            f"{max(0, math.floor(most))} (a day), or {name_option('inverse', True)}, which simulates nothing"
         )
 
 
@@ -274,7 +279,7 @@ def uniform(experiment: Experiment) -> tuple[Array, Array, Array, float]:
     if not rows <= SPARSE * experiment.time.size:
         raise InputError(
             f"{experiment.name}: {experiment.time.size} samples mostly {period:.3g} s apart lie over "
-            f"{rows * period:.3g} s; cut the record where it has gaps (--from, --to)"
+            f"{rows * period:.3g} s; cut the record where it has gaps ({name_option('start')}, {name_option('end')})"
         )
     t = np.arange(experiment.time[0], experiment.time[-1], period)
     return (

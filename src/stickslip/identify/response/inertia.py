@@ -208,7 +208,7 @@ def verdict_on(low: float, high: float) -> str:
     """Why a value that must be above 0 is not identified."""
     if high < 0.0:
         return "it lies below 0, which no axis has: torque and motion are not of one time, or one has the wrong sign"
-    return "the data do not distinguish it from 0" if low <= 0.0 else "its interval is too wide"
+    return "cannot be distinguished from 0" if low <= 0.0 else "its interval is too wide"
 
 
 def modes_of(experiments: Sequence[Experiment], axis: ServoAxis, inertia: float, above: float) -> list[float]:

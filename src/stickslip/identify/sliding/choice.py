@@ -22,6 +22,7 @@ from stickslip.identify.sliding.curve import (
     model_of,
 )
 from stickslip.identify.sliding.torques import Torques, steady_vector
+from stickslip.messages import axis_unit
 from stickslip.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -179,7 +180,7 @@ def choose_sliding(
 
 def _choice_notes(chosen: str, table: Mapping[str, Mapping[str, float]], laws: Iterable[str]) -> list[str]:
     errors = "; ".join(f"{name} {row['cross_validated_Nm']:.3g}" for name, row in table.items())
-    notes = [f"Chosen: {chosen}. Error at points left out, N·m: {errors}."]
+    notes = [f"Chosen: {chosen}. Error at points left out, {axis_unit('N·m')}: {errors}."]
     few = [name for name in laws if name not in table]
     if few:
         notes.append(f"Not tried, nothing free or too few points for the parameters: {', '.join(few)}.")

@@ -26,6 +26,7 @@ from stickslip.identify.sliding.curve_pictures import curve_picture, listed, res
 from stickslip.identify.sliding.offset import apart_from_friction, details_of, with_unknown_offset
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.identify.sliding.torques import Torques, steady_vector, tied_to_offset, vector_of
+from stickslip.messages import axis_unit
 from stickslip.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -233,7 +234,7 @@ def _noise_notes(found: Fit) -> list[str]:
         return [
             "The noise level is unknown, so that nothing can be reported as identified; give it or repeat velocities."
         ]
-    return [f"Noise of a point: {found.noise.std:.3g} N·m ({found.noise.source})."]
+    return [f"Noise of a point: {found.noise.std:.3g} {axis_unit('N·m')} ({found.noise.source})."]
 
 
 def _open_notes(unknown: Sequence[str], untouched: Sequence[str]) -> list[str]:
@@ -252,7 +253,7 @@ def _open_notes(unknown: Sequence[str], untouched: Sequence[str]) -> list[str]:
 def _measure_next(points: SlidingPoints, found: Fit, settling: float | None) -> tuple[str, ...]:
     """What would tell more."""
     if settling is not None:
-        return (f"Measure the torque at a constant velocity of {settling:.3g} {points.unit[0]}.",)
+        return (f"Measure the torque at a constant velocity of {settling:.3g} {axis_unit(points.unit[0])}.",)
     return () if found.noise.known else ("Repeat some velocities, so that the noise level is known.",)
 
 

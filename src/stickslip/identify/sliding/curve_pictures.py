@@ -12,6 +12,7 @@ from stickslip.identify.estimate import Picture, Trace
 from stickslip.identify.fit.uncertainty import Fit
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.identify.sliding.torques import Torques
+from stickslip.messages import axis_unit
 
 FAMILY = 40
 """How many of the equally good curves are drawn."""
@@ -65,12 +66,12 @@ def curve_picture(points: SlidingPoints, found: Fit, settling: float | None) -> 
         message = "Noise unknown: no parameter can be reported as identified."
     if settling is not None:
         traces.append(Trace("measure here next", np.array([settling]), np.array([math.nan]), "vertical"))
-        message += f" One more point at {settling:.3g} {points.unit[0]} would be most informative."
+        message += f" One more point at {settling:.3g} {axis_unit(points.unit[0])} would be most informative."
     if np.any(points.velocity == 0.0):
         message += " The points at the left edge are break-away torques."
     return Picture(
-        "sliding", f"Sliding curve: {law_of(found).title}", message, f"velocity ({points.unit[0]})",
-        f"friction torque ({points.unit[1]})", tuple(traces), "log",
+        "sliding", f"Sliding curve: {law_of(found).title}", message, f"velocity ({axis_unit(points.unit[0])})",
+        f"friction torque ({axis_unit(points.unit[1])})", tuple(traces), "log",
     )  # fmt: skip
 
 
@@ -80,6 +81,7 @@ def residual_picture(points: SlidingPoints, found: Fit) -> Picture:
     zero = np.array([float(np.min(points.velocity)), float(np.max(points.velocity))])
     traces = (Trace("", zero, 0.0 * zero), Trace("", points.velocity, rest, "points"))
     return Picture(
-        "sliding-residuals", "Sliding curve: residuals", f"Root mean square {found.rms:.3g} {points.unit[1]}",
-        f"velocity ({points.unit[0]})", f"model minus measured ({points.unit[1]})", traces,
+        "sliding-residuals", "Sliding curve: residuals", f"Root mean square {found.rms:.3g} "
+            f"{axis_unit(points.unit[1])}",
+        f"velocity ({axis_unit(points.unit[0])})", f"model minus measured ({axis_unit(points.unit[1])})", traces,
     )  # fmt: skip

@@ -13,8 +13,9 @@ from stickslip.identify.estimate import Estimate
 from stickslip.identify.fit.uncertainty import Fit
 from stickslip.identify.sliding.points import SlidingPoints
 from stickslip.identify.sliding.torques import OFFSET
+from stickslip.messages import axis_unit, name_frozen
 
-LEVEL = "or give --freeze offset=0 if nothing but friction acts (a level axis)"
+LEVEL = f"or give {name_frozen('offset', 0)} if nothing but friction acts (a level axis)"
 BOTH = f"move in both directions, {LEVEL}"
 
 
@@ -47,7 +48,7 @@ def apart_from_friction(found: Fit, points: SlidingPoints) -> Fit:
     """
     if not points.one_way:
         return found
-    why = f"one direction does not distinguish it from Coulomb friction; {BOTH}"
+    why = f"cannot be distinguished from Coulomb friction in one direction; {BOTH}"
     judged = [replace(e, identified=False, verdict=why) if e.name == "offset" else e for e in found.estimates]
     return replace(found, estimates=tuple(judged))
 
@@ -58,7 +59,7 @@ def _sum(e: Estimate, points: SlidingPoints) -> str:
         return "it cannot be distinguished from a constant torque (offset)"
     sign = "+" if points.side[0] > 0.0 else "-"
     limits = f" [{e.lower:.4g}, {e.upper:.4g}]" if math.isfinite(e.lower) and math.isfinite(e.upper) else ""
-    return f"one direction determines only {e.name} {sign} offset, {e.value:.4g}{limits} {e.unit}"
+    return f"one direction determines only {e.name} {sign} offset, {e.value:.4g}{limits} {axis_unit(e.unit)}"
 
 
 def details_of(found: Fit, points: SlidingPoints) -> tuple[Mapping[str, Any], list[str]]:
@@ -69,7 +70,8 @@ def details_of(found: Fit, points: SlidingPoints) -> tuple[Mapping[str, Any], li
     if points.one_way or offset.lower <= 0.0 <= offset.upper:
         return {}, []
     note = (
-        f"A constant torque of {offset.value:.3g} {offset.unit} acts against positive motion. Friction that differs by "
+        f"A constant torque of {offset.value:.3g} {axis_unit(offset.unit)} acts against positive motion. "
+        "Friction that differs by "
         "direction looks alike."
     )
     return {"constant_torque": offset.value}, [note]

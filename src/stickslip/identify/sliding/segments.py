@@ -17,6 +17,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.identify.sliding.levels import Level, find_levels, level_runs, slope_of
 from stickslip.identify.sliding.points import SlidingPoints
+from stickslip.messages import axis_unit, name_option
 from stickslip.record import Record, encoder_step
 from stickslip.rigs.procedures.resting import RESTING, resting
 
@@ -229,7 +230,11 @@ def sliding_points(
         stuck += sticking
     if not segments:
         integrated = all("position" in r.meta.get("derived", {}) for r in several)
-        table = "; of a table of steady points leave times and --sample-time out" if integrated else ""
+        table = (
+            f"; of a table of steady points leave times and {name_option('sample_time')} out"
+            if integrated
+            else ""
+        )
         raise InputError(f"{_none_found(dropped)}{table}")
     std = np.array([s.std for s in segments])
     usable = bool(np.all(np.isfinite(std) & (std > 0.0)))
@@ -322,7 +327,7 @@ def _none_found(dropped: Sequence[Dropped]) -> str:
     said = f"; dropped: {_listed_drops(dropped)}" if dropped else ""
     return (
         f"no segment of constant velocity to average the torque over{said}; record longer ones, or identify the whole "
-        "axis from its motion (--method axis)"
+        f"axis from its motion ({name_option('method', 'axis')})"
     )
 
 
@@ -350,11 +355,12 @@ def _notes(
     return notes
 
 
-def _listed_drops(dropped: Sequence[Dropped], unit: str = "rad/s") -> str:
+def _listed_drops(dropped: Sequence[Dropped], unit: str = "") -> str:
     """What was dropped, those for one reason together."""
     reasons: dict[str, list[float]] = {}
     for d in dropped:
         reasons.setdefault(d.why, []).append(d.velocity)
+    unit = unit or axis_unit("rad/s")
     parts = [f"{_listed(v)} {unit} ({why})" for why, v in list(reasons.items())[:NAMED]]
     more = sum(len(v) for v in list(reasons.values())[NAMED:])
     return "; ".join(parts) + (f"; {more} more" if more else "")
