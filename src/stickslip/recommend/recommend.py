@@ -30,7 +30,7 @@ from stickslip.recommend.candidates import (
     rings_alone,
 )
 from stickslip.recommend.late import hardly_damped_where_late, refuse_late, seconds_meant
-from stickslip.recommend.long_rest import hunts_alone, hunts_with, long_rests, unsure_at_rest
+from stickslip.recommend.long_rest import hunts_alone, hunts_with, long_rests, rest_words, unsure_at_rest
 from stickslip.recommend.motion_notes import by_attribute, on_motion
 from stickslip.recommend.notes import (
     ALLOWANCE,
@@ -161,7 +161,13 @@ def recommend(
         *_reasons(found, result, bench, others), *interval_allows(found, result),
     ]  # fmt: skip
     comparisons = tuple(compared(result, first, bench, others))
-    return replace(result, notes=tuple(notes), warnings=tuple(warnings), comparisons=comparisons)
+    return replace(
+        result,
+        notes=tuple(notes),
+        warnings=tuple(warnings),
+        comparisons=comparisons,
+        hunting=rest_words(told),
+    )
 
 
 def compared(result: Recommendation, first: Trial, bench: Bench, others: Bench) -> Iterator[Comparison]:

@@ -87,6 +87,8 @@ class Recommendation:
         Those of the notes that limit the answer or ask for an action.
     comparisons : tuple of Comparison
         The best estimate and, if something is recommended, the sampled axis on which the most of the error is left.
+    hunting : str
+        Whether the linear controller alone hunts at rest, and how long that was simulated.
     """
 
     chosen: Candidate | None
@@ -109,6 +111,7 @@ class Recommendation:
     why_none: str = ""
     warnings: tuple[str, ...] = ()
     comparisons: tuple[Comparison, ...] = ()
+    hunting: str = ""
 
     @property
     def instead(self) -> Beside | None:
@@ -171,7 +174,7 @@ class Recommendation:
             "inertia_alone": self.inertia_alone.as_dict() if self.inertia_alone else None,
             "axes": self.axes, "axes_confirmed": self.confirmed_on, "notes": list(self.notes),
             "warnings": list(self.warnings), "errors_rms": {c.axis: list(c.errors) for c in self.comparisons},
-            "linear_alone_rings": self.rings, "drive": self.drive.as_dict(),
+            "linear_alone_rings": self.rings, "hunting": self.hunting, "drive": self.drive.as_dict(),
             "candidates": [c.as_dict() for c in self.candidates],
             "compensators": [b.as_dict() for b in self.beside],
             "instead": self.instead.label if self.instead else None, "why_none": self.why_none,

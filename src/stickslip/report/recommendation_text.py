@@ -68,7 +68,7 @@ def summary_lines(
             f"error:             {quantity(result.linear_error, angle)} RMS with the linear controller alone"
         )
     else:
-        out = [f"switch on:         {switched_on_words(result)}"]
+        out = [f"switch on:         {switched_on_words(result, unit)}"]
         said = [f"{error_from_to(*c.errors, angle)} RMS ({c.axis})" for c in comparisons]
         out.append(f"error:             {'; '.join(said)}")
         out.append(f"error reduction:   {reduction_words(result)}")
@@ -76,21 +76,25 @@ def summary_lines(
     out.append(f"motion:            {motion_words(result, unit)}")
     if margins := list(margin_words(result, stability)):
         out.append(f"margins:           {'; '.join(margins)}")
+    if result.hunting and not result.rings:
+        out.append(f"at rest:           {result.hunting}")
     if result.rings:
         out.append(f"linear alone:      without a compensator it oscillates {result.rings}")
     missing = ", ".join(not_simulated(result.drive.machine, found.train))
-    out.append(f"not simulated:     {missing}{'' if result.why_none else '; the interval allows for them'}")
+    out.append(
+        f"not simulated:     {missing}{'; the interval allows for them' if result.confirmed_on > 1 else ''}"
+    )
     return [*out, *(f"warning:           {text}" for text in result.warnings)]
 
 
-def switched_on_words(result: Recommendation) -> str:
+def switched_on_words(result: Recommendation, unit: Callable[[str], str]) -> str:
     """Return what is switched on, with the inertia and the constant torque that are fed forward too."""
     if result.instead is not None:
         return result.instead.label
     assert result.chosen is not None
     setting = result.chosen.setting
     more = [f"lead {setting.lead:.3g} s"] if setting.lead else []
-    more += [f"dead band {setting.deadband:.3g} rad/s"] if setting.deadband else []
+    more += [f"dead band {setting.deadband:.3g} {unit('rad/s')}"] if setting.deadband else []
     fed = ["inertia"] if setting.inertia_feedforward and setting.compensates else []
     fed += ["constant torque"] if setting.offset else []
     more += [f"{' and '.join(fed)} fed forward"] if fed else []
@@ -105,7 +109,7 @@ def verdict(result: Recommendation, unit: Callable[[str], str]) -> str:
     promise = f", and by {percent(*result.reduction)} on the axis " if result.confirmed_on > 1 else " "
     sure = f"({100.0 * result.confidence:.0f} % interval)" if result.confirmed_on > 1 else "(no interval)"
     return (
-        f"Switch on {switched_on_words(result)}: the RMS position error falls from "
+        f"Switch on {switched_on_words(result, unit)}: the RMS position error falls from "
         f"{error_from_to(*first.errors, unit('rad'))} on the best estimate{promise}{sure}."
     )
 
@@ -119,7 +123,7 @@ def error_from_to(before: float, after: float, angle: str) -> str:
 def reduction_words(result: Recommendation) -> str:
     """Return the promised part of the error that is taken away."""
     if result.confirmed_on < 2:
-        return "no interval: too few sampled axes (--confirm), or a law without intervals"
+        return "no interval (the law has none, or --confirm is below 2)"
     return (
         f"{percent(*result.reduction)} ({100.0 * result.confidence:.0f} % interval), safe on all "
         f"{result.confirmed_on} sampled axes"

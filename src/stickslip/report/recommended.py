@@ -215,16 +215,18 @@ def margin_rows(result: Recommendation, stability: ControllerStability | None) -
     chosen = result.switched_on
     if chosen is not None and chosen.setting.compensates:
         yield "gain of the compensator, by simulation", margin(chosen, result)
-    if stability is None or not stability.is_linear:
+    loops = stability.loops if stability is not None and stability.is_linear else ()
+    if not loops:
         yield "poles of the loop about rest", "not determined: the loop is not linear about rest"
-        return
-    for loop in stability.loops:
+    for loop in loops:
         name = f"{loop.name}, best estimate"
         if not loop.poles.stable:
             yield name, f"unstable ({loop.poles.growth:+.1f}/s at {loop.poles.frequency:.1f} Hz)"
             continue
         late = f"{loop.delay:.2g}" if loop.delay < LATEST else f"more than {LATEST:g}"
         yield name, f"{loop.margins().partition(', ')[2]}; tolerates {late} more samples of delay"
+    if result.hunting and not result.rings:
+        yield "at rest", result.hunting
     if result.rings:
         yield "linear controller alone", f"oscillates {result.rings}"
 
