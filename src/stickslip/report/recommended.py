@@ -14,11 +14,13 @@ import numpy as np
 
 from stickslip.analyse.controller_margins import LATEST, ControllerStability
 from stickslip.analyse.wording import quantity
+from stickslip.identify.estimate import Picture
 from stickslip.identify.identified_file import Identified
 from stickslip.recommend.candidate_run import Trial
 from stickslip.recommend.notes import not_simulated
 from stickslip.recommend.recommendation import ALLOWANCE, Comparison, Recommendation
 from stickslip.report import plots
+from stickslip.report.identification import panel_of
 from stickslip.report.page import filled
 from stickslip.report.plots import Curve, Panel
 from stickslip.report.recommendation_text import (
@@ -36,24 +38,30 @@ from stickslip.report.styles import REFERENCE, Style
 from stickslip.whole_files import write_whole
 
 BEFORE, AFTER = Style("#D55E00", width=0.9), Style("#0072B2", width=1.1)
-HEIGHT = 1.35
-"""Of a panel, inches: three panels and the legend fit a screen."""
+HEIGHT, TALLER = 1.35, 1.75
+"""Of a panel, inches: three panels and the legend fit a screen. The taller ones each have a time axis of their own."""
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def recommendation_figure(result: Recommendation, unit: Callable[[str], str]) -> Any:
-    """Return the reference and the position error before and after as a Matplotlib figure.
+def recommendation_figure(
+    result: Recommendation, unit: Callable[[str], str], curve: Picture | None = None
+) -> Any:
+    """Return the position error before and after as a Matplotlib figure, below the reference or the friction curve.
 
     Parameters
     ----------
     result : Recommendation
     unit : callable
         Turns an angular unit into the axis's own.
+    curve : Picture, optional
+        The identified friction over velocity, drawn in place of the reference.
     """
-    return plots.figure_of(
-        figure_title(result, unit), loop_words(result, unit), list(panels_of(result, unit)), HEIGHT
-    )
+    title, loop = figure_title(result, unit), loop_words(result, unit)
+    reference, *errors = panels_of(result, unit)
+    if curve is None:
+        return plots.figure_of(title, loop, [reference, *errors], HEIGHT)
+    return plots.figure_of(title, loop, [panel_of(curve), *errors], TALLER)
 
 
 def figure_title(result: Recommendation, unit: Callable[[str], str]) -> str:

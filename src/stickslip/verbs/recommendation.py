@@ -32,6 +32,7 @@ from stickslip.report.recommendation_text import (
     worst_left,
 )
 from stickslip.verbs import own_files
+from stickslip.verbs.identification import IdentificationResult
 from stickslip.whole_files import prepared_folder
 
 
@@ -132,8 +133,14 @@ class RecommendationResult:
         except InputError:
             return None
 
-    def plot(self) -> Any:
+    @arguments_checked
+    def plot(self, found: IdentificationResult | None = None) -> Any:
         """Draw the position error without and with what is recommended, on the best estimate and on the worst axis.
+
+        Parameters
+        ----------
+        found : IdentificationResult, optional
+            The identification: its measured torque and friction curve are drawn in place of the reference.
 
         Returns
         -------
@@ -143,8 +150,9 @@ class RecommendationResult:
         from stickslip.report.plots import house_style
         from stickslip.report.recommended import recommendation_figure
 
+        curve = next((p for p in found.pictures if p.name == "sliding-curve"), None) if found else None
         with house_style():
-            return recommendation_figure(self.recommendation, self.identified.unit)
+            return recommendation_figure(self.recommendation, self.identified.unit, curve)
 
     @arguments_checked
     def report(
