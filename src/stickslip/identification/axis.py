@@ -28,8 +28,14 @@ from stickslip.identification.laws import (
     note_on,
 )
 from stickslip.identification.memo import EstimateSliding
-from stickslip.identification.notes import cause_of, on_alternatives, on_drift, on_timing, reason_for
-from stickslip.identification.posterior import EXPONENTS
+from stickslip.identification.notes import (
+    cause_of,
+    on_alternatives,
+    on_drift,
+    on_exponents,
+    on_timing,
+    reason_for,
+)
 from stickslip.identification.search import Asked as SlidingAsked
 from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
 from stickslip.identification.slow_motion import (
@@ -154,9 +160,9 @@ def identify_axis(
     asked = Asked(free, frozen, given, extras, robust)
     refuse_harmonics(experiments, extras.harmonics + extras.friction_harmonics, simulated=True)
     seen = look_at(experiments, axis, asked, tried, per_direction, skew, estimate)
-    asked = with_exponent(asked, tried, seen.sliding)
+    held_exponent = hold_likeliest_exponent(asked, tried, seen.sliding)
     if seen.start is None:
-        require_start(seen.experiments, axis, tried, asked)
+        require_start(seen.experiments, axis, tried, held_exponent)
     notes, candidates = list(seen.notes), list[Candidate]()
     if per_direction and "offset" in frozen:
         notes.insert(0, BY_DIRECTION)
@@ -165,7 +171,7 @@ def identify_axis(
     if len(tried) > 1:
         fitted, held = hold_out(seen.experiments, validation)
         held = [aligned(t, seen.sliding) for t in held]
-        candidates = compared(seen, fitted, held, tried, asked, simulated, progress)
+        candidates = compared(seen, fitted, held, tried, held_exponent, simulated, progress)
         notes.append(note_on(candidates, tried[choose(candidates)].name))
     place = choose(candidates) if candidates else 0
     chosen = tried[place]
@@ -175,10 +181,13 @@ def identify_axis(
     why = ""
     if simulated:
         try:
-            fit = fit_law(seen.evidence, chosen, own, start)
+            exponents = exponents_open(asked, chosen, seen.sliding)
+            fit = fit_law(seen.evidence, chosen, own, start, exponents)
+            notes += on_exponents(fit.exponents)
             return assembled(seen, chosen, own, fit, validation, candidates, notes)
         except InputError as error:
             why = f"{NOT_SIMULATED} {error}."
+    own = asked_of(chosen, held_exponent, tried)
     result = judged(fitted_axis(seen.aligned, axis, chosen, seen.start, own), profiles)
     return by_output(
         seen, result, validation, candidates, [*notes, *filter(None, [why]), narrow_note(result)]
@@ -260,14 +269,20 @@ def look_at(
     return Seen(recorded, experiments, moved, axis, start, sliding, (*known, *notes))
 
 
-def with_exponent(asked: Asked, laws: Sequence[Law], sliding: SlidingPosterior | None) -> Asked:
-    """What is asked, with the likelier exponent of friction's fall where the user names none."""
-    if sliding is None or "delta_s" in (*asked.free, *asked.values):
-        return asked
-    if not any(f.name == "delta_s" for law in laws for f in law.fields):
-        return asked
-    exponent = max(EXPONENTS, key=lambda e: sum(m.weight for m in sliding.members if m.exponent == e))
-    return replace(asked, values={**asked.values, "delta_s": exponent})
+def hold_likeliest_exponent(asked: Asked, laws: Sequence[Law], sliding: SlidingPosterior | None) -> Asked:
+    """Hold the exponent of friction's fall where no law and no user fixes it: laws are compared with one."""
+    for law in laws:
+        if exponents := exponents_open(asked, law, sliding):
+            return replace(asked, values={**asked.values, "delta_s": next(iter(exponents))})
+    return asked
+
+
+def exponents_open(asked: Asked, law: Law, sliding: SlidingPosterior | None) -> dict[float, float]:
+    """Exponents of a law's fall with their probabilities from sliding; none where the law or the user fixes it."""
+    has = any(f.name == "delta_s" for f in law.fields)
+    if sliding is None or not has or "delta_s" in (*asked.free, *asked.values):
+        return {}
+    return sliding.exponents
 
 
 def sliding_asked(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from stickslip.identification.sliding import PRESENT, SlidingPosterior
@@ -118,3 +119,17 @@ def against_given(found: SlidingPosterior, given: float) -> list[str]:
 
 def _when(skew: float) -> str:
     return f"{1e3 * abs(skew):.3g} ms {'after' if skew < 0.0 else 'before'}"
+
+
+def on_exponents(exponents: Mapping[float, float]) -> list[str]:
+    """Return how likely the exponent of friction's fall is, where another one is possible."""
+    if not exponents:
+        return []
+    likeliest = max(exponents, key=lambda e: exponents[e])
+    probability = f"{exponents[likeliest]:.0%}"
+    if probability == "100%":
+        return []
+    return [
+        f"Friction falls with the exponent delta_s = {likeliest:g} with a probability of {probability}; the intervals "
+        "of fs and vs include the other exponent."
+    ]

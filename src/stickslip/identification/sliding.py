@@ -18,6 +18,7 @@ from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.mixture import NEGLIGIBLE, Member, Mixture, mix
+from stickslip.identification.posterior import EXPONENT_ODDS, EXPONENTS
 from stickslip.identification.rows import LATEST, SlidingRows, sample_rows, sliding_rows
 from stickslip.identification.search import Asked, Fit, Start, settle
 from stickslip.identify.experiment import Experiment, insist_on_motion
@@ -151,6 +152,23 @@ class SlidingPosterior:
     def falls(self) -> float:
         """Probability that friction falls with velocity within the recorded speeds."""
         return float(sum(m.weight for m in self.members if np.isfinite(m.vs)))
+
+    @property
+    def exponents(self) -> dict[float, float]:
+        """Probability of every exponent of friction's fall, the likeliest first; its prior where nothing falls."""
+        prior = dict(zip(EXPONENTS, EXPONENT_ODDS, strict=True))
+        found = {e: float(sum(m.weight for m in self.members if m.exponent == e)) for e in prior}
+        whole = sum(found.values())
+        share = {e: p / whole for e, p in found.items() if p > 0.0} if whole else prior
+        return dict(sorted(share.items(), key=lambda x: -x[1]))
+
+    def given_exponent(self, exponent: float) -> SlidingPosterior:
+        """The posterior under the condition that friction falls with one exponent, or does not fall at all."""
+        members = [m for m in self.members if m.exponent == exponent or np.isnan(m.exponent)]
+        whole = sum(m.weight for m in members)
+        if not whole:
+            return self
+        return replace(self, members=tuple(replace(m, weight=m.weight / whole) for m in members))
 
     def presence(self, name: str) -> float:
         """Probability that an alternative is present."""

@@ -17,14 +17,15 @@ import functools
 import math
 import operator
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
-from stickslip.identification.sliding import QUANTILE, SlidingPosterior
+from stickslip.identification.posterior import log_sum
+from stickslip.identification.sliding import QUANTILE, SlidingPosterior, quantiles
 from stickslip.identify.axis.gravity import hanging
 from stickslip.identify.axis.problem import mechanics_of
 from stickslip.identify.axis.search import Asked, laid_out
@@ -100,6 +101,10 @@ class Evidence:
     start: InverseDynamics
     sliding: SlidingPosterior | None
 
+    def given_exponent(self, exponent: float) -> Evidence:
+        """The same, of sliding only what friction with one exponent of its fall leaves possible."""
+        return replace(self, sliding=self.sliding and self.sliding.given_exponent(exponent))
+
 
 @dataclass(frozen=True, eq=False)
 class LawFit:
@@ -119,6 +124,10 @@ class LawFit:
         RMS deviation, in standard deviations, of what the simulation alone says of the steady friction from sliding.
     corrections : tuple of array
         Torque that the model lacks, N·m (N), in the observer's band.
+    level : float
+        Of friction, N·m (N), that torques are compared with.
+    exponents : mapping of float to float
+        Probability of every exponent ``delta_s`` that was fitted; empty where one is given.
     """
 
     vector: Vector
@@ -128,6 +137,8 @@ class LawFit:
     estimates: tuple[Estimate, ...]
     contradiction: float
     corrections: tuple[Array, ...]
+    level: float
+    exponents: Mapping[float, float] = field(default_factory=dict[float, float])
 
     def combinations(self) -> list[str]:
         """Products of parameters that are determined although none of them is, in a sentence each."""
@@ -314,8 +325,11 @@ def start_beside(evidence: Evidence) -> InverseDynamics:
 # ---- the fit --------------------------------------------------------------------------------------------------------
 
 
-def fit_law(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any] | None = None) -> LawFit:
-    """Fit a law to slow motion, beside what sliding says.
+def fit_law(
+    evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any] | None = None,
+    exponents: Mapping[float, float] | None = None,
+) -> LawFit:  # fmt: skip
+    """Fit a law to slow motion, given what gross sliding determines.
 
     Parameters
     ----------
@@ -325,14 +339,50 @@ def fit_law(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any]
         What the user holds, frees and gives.
     start : mapping, optional
         Values of the law at which the search begins; several starts are tried where None.
+    exponents : mapping of float to float, optional
+        Exponents ``delta_s`` of friction's fall with their probabilities from sliding. The law is fitted with each; the
+        likeliest gives the values, and the intervals are those of the mixture (Hoeting et al. 1999).
 
     Raises
     ------
     InputError
         If a record has no drive signal, the axis has backlash, or no simulation succeeds.
     """
+    if not exponents:
+        return fit_minimum(evidence, law, asked, start or {}).law_fit
+    minima = list[Minimum]()
+    for exponent in exponents:
+        values = {**(start or {}), "delta_s": exponent}
+        minima.append(fit_minimum(evidence.given_exponent(exponent), law, asked, values))
+        start = minima[0].law_fit.model.parameters._asdict()
+    first, best = minima[0], min(minima, key=minima[0].cost_of)
+    if best is not first:
+        # The search is local: what it found with another exponent may be a better start for this one.
+        likeliest = next(iter(exponents))
+        values = {**best.law_fit.model.parameters._asdict(), "delta_s": likeliest}
+        again = fit_minimum(evidence.given_exponent(likeliest), law, asked, values)
+        minima[0] = min(first, again, key=first.cost_of)
+    return mix_minima(minima, list(exponents.values()))
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """A law fitted with one exponent, the criterion that it minimises, and where."""
+
+    law_fit: LawFit
+    criterion: Criterion
+    u: Array
+
+    def cost_of(self, other: Minimum) -> float:
+        """Return the sum of squares of another minimum under this one's weights."""
+        vector, prior = other.criterion.vector, other.criterion.prior
+        return replace(self.criterion, vector=vector, prior=prior).cost(other.u)
+
+
+def fit_minimum(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any]) -> Minimum:
+    """Fit a law to slow motion from a start."""
     seen = watched(evidence.experiments, evidence.axis, asked)
-    criterion, u = search_law(evidence, law, replace(asked, values={**asked.values, **(start or {})}), seen)
+    criterion, u = search_law(evidence, law, replace(asked, values={**asked.values, **start}), seen)
     inertia = criterion.vector.named(u)["inertia"]
     level = abs(start_beside(evidence).coulomb)
     exact = [prepare(m, law, inertia, level, seen.band, 1.0, math.inf, EXACT) for m in seen.motions]
@@ -357,9 +407,37 @@ def fit_law(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, Any]
     estimates = unresolved_refused(estimates, law, own, evidence.experiments, level)
     if evidence.sliding is not None:
         estimates = compliant_refused(estimates, model, evidence.sliding)
-    return LawFit(
-        vector, u, covariance, model, tuple(estimates), contradiction, tuple(criterion.corrections(u))
-    )
+    corrections = tuple(criterion.corrections(u))
+    fit = LawFit(vector, u, covariance, model, tuple(estimates), contradiction, corrections, level)
+    return Minimum(fit, criterion, optimum.u)
+
+
+def mix_minima(minima: Sequence[Minimum], probabilities: Sequence[float]) -> LawFit:
+    """The likeliest fit with the intervals of the mixture over all of them.
+
+    The likelihood of slow motion counts as its standard deviations do: as of `UNMODELLED` squared times fewer rows.
+    """
+    cost = np.array([minima[0].cost_of(m) for m in minima])
+    log_weight = np.log(probabilities) - 0.5 * cost / UNMODELLED**2
+    share = np.exp(log_weight - log_sum(log_weight))
+    best = minima[int(np.argmax(share))].law_fit
+    parameters = {p.name: p for p in best.vector.free}
+    found = list[Estimate]()
+    for e in best.estimates:
+        same = [next(x for x in m.law_fit.estimates if x.name == e.name) for m in minima]
+        ends = np.array([x.interval for x in same])
+        if not np.all(np.isfinite(ends)):
+            found.append(e)
+            continue
+        # A positive number's interval is one of its logarithm.
+        positive = bool(np.all(ends > 0.0))
+        ends = np.log(ends) if positive else ends
+        low, high = quantiles(ends.mean(axis=1), 0.5 * (ends[:, 1] - ends[:, 0]), share)
+        low, high = (math.exp(low), math.exp(high)) if positive else (low, high)
+        mixed = judged(parameters[e.name], e.value, low, high, best.level)
+        found.append(mixed if e.identified else replace(mixed, identified=False, verdict=e.verdict))
+    exponents = [m.law_fit.model.parameters.delta_s for m in minima]
+    return replace(best, estimates=tuple(found), exponents=dict(zip(exponents, share.tolist(), strict=True)))
 
 
 def compliant_refused(
