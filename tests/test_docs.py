@@ -112,6 +112,13 @@ def test_the_page_on_the_library_does_what_it_says(tmp_path: Path) -> None:
     assert (tmp_path / "c" / "model.c").exists()
 
 
+@pytest.mark.slow
+def test_the_front_page_does_what_it_says(tmp_path: Path) -> None:
+    command = [sys.executable, str(DOCS / "_ext" / "sessions.py"), str(DOCS / "index.md"), str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 def test_a_page_that_shows_what_is_not_printed_is_refused(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("```python\nprint(1 + 1)\n```\n\n```text\n3\n```\n")

@@ -99,7 +99,7 @@ def panels_of(result: Recommendation, unit: Callable[[str], str]) -> Iterator[Pa
     largest = max(float(np.max(np.abs(error_of(c.before)))) for c in result.comparisons)
     factor, prefixed = plots.scaled(largest, angle)
     for comparison in result.comparisons:
-        curves = [curve(error_of(comparison.before), "without", BEFORE, factor)]
+        curves = [curve(error_of(comparison.before), "loop alone", BEFORE, factor)]
         if comparison.after is not None:
             curves.append(curve(error_of(comparison.after), "with what is recommended", AFTER, factor))
         yield Panel(
