@@ -123,7 +123,7 @@ def error_from_to(before: float, after: float, angle: str) -> str:
 def reduction_words(result: Recommendation) -> str:
     """Return the promised part of the error that is taken away."""
     if result.confirmed_on < 2:
-        return "no interval (the law has none, or --confirm is below 2)"
+        return "no interval (the law has none, or fewer than two axes were sampled)"
     return (
         f"{percent(*result.reduction)} ({100.0 * result.confidence:.0f} % interval), safe on all "
         f"{result.confirmed_on} sampled axes"

@@ -244,8 +244,8 @@ def when_to_repeat(result: Recommendation, unit: Callable[[str], str]) -> Iterat
     path = result.drive.path
     yield "The loop changes: gains, velocity filter, feedforward, sample time, delay or torque limit."
     yield (
-        f"The motion gets faster than {path.top_speed:.3g} {unit('rad/s')}, much slower, or much shorter: give the new "
-        "one with --motion."
+        f"The motion gets faster than {path.top_speed:.3g} {unit('rad/s')}, much slower, or much shorter: "
+        "recommend again for the new one."
     )
     yield (
         "Friction or inertia changes: another load, temperature, lubricant, seal or belt tension, or wear. Record the "
