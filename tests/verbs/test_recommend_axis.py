@@ -49,7 +49,7 @@ def test_an_integral_that_takes_its_time_to_break_away_is_found_to_hunt(ki: floa
 @pytest.mark.usefixtures("few")
 def test_a_loop_without_an_integral_cannot_hunt() -> None:
     advice = ss.recommend(AXIS, bandwidth=20.0, motion=SLOW)
-    assert "the loop has no integral part and cannot hunt" in str(advice)
+    assert "the loop alone has no integral part and cannot hunt" in str(advice)
 
 
 @pytest.mark.parametrize(

@@ -134,7 +134,7 @@ def hunts_alone(bench: Bench, torque: str) -> str:
 def rest_words(bench: Bench) -> str:
     """Return whether the linear controller alone hunts at rest, in words."""
     if not integrates(bench.linear):
-        return "the loop has no integral part and cannot hunt"
+        return "the loop alone has no integral part and cannot hunt"
     swings = alone_for_long(bench)
     on = f"{len(swings)} axes" if len(swings) > 1 else "the best estimate"
     if hunting := sum(swing > 0.0 for swing in swings):

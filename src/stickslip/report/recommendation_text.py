@@ -17,7 +17,7 @@ from stickslip.recommend.candidates import Candidate
 from stickslip.recommend.course import measured
 from stickslip.recommend.notes import ALLOWANCE, not_simulated
 from stickslip.recommend.recommendation import Recommendation
-from stickslip.report.plots import scaled
+from stickslip.report.plots import one_prefix
 
 BEATEN = "not tried further: another one leaves less"
 
@@ -116,8 +116,8 @@ def verdict(result: Recommendation, unit: Callable[[str], str]) -> str:
 
 def error_from_to(before: float, after: float, angle: str) -> str:
     """Return two errors, rad (m), in one prefix: "48.8 to 0.34 mrad"."""
-    factor, prefixed = scaled(before, angle)
-    return f"{factor * before:.3g} to {factor * after:.3g} {prefixed}"
+    factor, prefix = one_prefix(before, after)
+    return f"{factor * before:.3g} to {factor * after:.3g} {prefix}{angle}"
 
 
 def reduction_words(result: Recommendation) -> str:
@@ -271,18 +271,23 @@ def taken_away(left: float) -> str:
 
 def beside_lines(result: Recommendation) -> list[str]:
     """Compensators of the catalogue: the error that each leaves, or why it is not switched on."""
-    if not result.beside:
-        return []
-    out = ["", f"{'compensator':<22}{'error left':>10}  {'worst':>7}  switched on"]
+    rows = list(beside_rows(result))
+    head = ["", f"{'compensator':<22}{'error left':>10}  {'worst':>7}  switched on"]
+    return (
+        [*head, *(f"{name:<22}{left:>10}  {worst:>7}  {why}" for name, left, worst, why in rows), ""]
+        if rows
+        else []
+    )
+
+
+def beside_rows(result: Recommendation) -> Iterator[tuple[str, str, str, str]]:
+    """Yield every compensator of the catalogue: name, error left, worst axis, and whether it is switched on or why
+    not."""
     for b in result.beside:
-        numbers = (
-            f"{100 * b.errors[0]:>8.1f} %  {100 * b.worst:>5.1f} %" if b.errors else f"{'–':>10}  {'–':>7}"
-        )
+        left, worst = (f"{100 * b.errors[0]:.1f} %", f"{100 * b.worst:.1f} %") if b.errors else ("–", "–")
         hardly = result.instead is None and result.chosen is not None and b.at_most <= result.chosen.worst
         why = b.why_not or ("it leaves hardly less" if hardly else "another one leaves less")
-        mark = "<- yes" if b is result.instead else f"no: {why}"
-        out.append(f"{b.label:<22}{numbers}  {mark}")
-    return [*out, ""]
+        yield b.label, left, worst, "<- yes" if b is result.instead else f"no: {why}"
 
 
 def instead_lines(result: Recommendation, taken: Beside) -> list[str]:

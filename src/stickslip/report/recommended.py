@@ -24,6 +24,7 @@ from stickslip.report.identification import panel_of
 from stickslip.report.page import filled
 from stickslip.report.plots import Curve, Panel
 from stickslip.report.recommendation_text import (
+    beside_rows,
     error_from_to,
     loop_words,
     margin,
@@ -172,6 +173,7 @@ def write_recommendation(
              f"{100.0 * c.errors[0]:.1f} %", worst_left(c), safety(c)]
             for c in result.candidates
         ],
+        compensators=[(*row[:3], row[3].removeprefix("<- ")) for row in beside_rows(result)],
         deadband=f"dead band, {found.unit('rad/s')}",
         data=json.dumps(result.as_dict(), indent=1, default=str, ensure_ascii=False),
     )  # fmt: skip
@@ -249,7 +251,7 @@ def when_to_repeat(result: Recommendation, unit: Callable[[str], str]) -> Iterat
     )
     yield (
         "Friction or inertia changes: another load, temperature, lubricant, seal or belt tension, or wear. Record the "
-        "same motion again; `stickslip compare` tests whether friction has changed."
+        "same motion again; stickslip compare tests whether friction has changed."
     )
     yield "The machine behaves otherwise than this page says. Then record it with the compensator switched on."
 
