@@ -238,6 +238,8 @@ def figure_of(title: str, message: str, panels: Sequence[Panel], height: float =
 
     Within `house_style` it looks as all figures of the package. A notebook shows it.
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
     from stickslip.report.shown_figure import ShownFigure
 
     common = [p for p in panels if not p.legend]
@@ -251,6 +253,7 @@ def figure_of(title: str, message: str, panels: Sequence[Panel], height: float =
     shared = len({p.x_label for p in panels if p.x_label}) == 1
     total = head + height * len(panels) + (0.26 if common or shared else 0.0) + 0.17 * rows
     figure: Any = ShownFigure(figsize=(WIDTH, total))
+    FigureCanvasAgg(figure)
     figure.text(0.02, 1.0 - 0.07 / total, "\n".join(heading), va="top", fontsize=8.0, fontweight="bold")
     figure.text(
         0.02, 1.0 - (0.12 + 0.13 * len(heading)) / total, "\n".join(lines), va="top", fontsize=7.5, color="#444444"

@@ -90,7 +90,7 @@ def panels_of(result: Recommendation, unit: Callable[[str], str]) -> Iterator[Pa
     span = (0.0, (first.before.position.size - start) * first.before.sample_time)
 
     def curve(values: Array, label: str, style: Style, factor: float = 1.0) -> Curve:
-        time = first.before.sample_time * np.arange(values.size - start)
+        time: Array = first.before.sample_time * np.arange(values.size - start, dtype=np.float64)
         return Curve(*plots.envelope(time, factor * values[start:]), label, style)
 
     factor, prefixed = plots.scaled(float(np.max(np.abs(first.before.reference))), angle)

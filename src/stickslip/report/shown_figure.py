@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import io
-from typing import Any
+from typing import Any, cast
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from stickslip.report.plots import DPI
@@ -17,11 +16,7 @@ class ShownFigure(Figure):
     `savefig` writes it. It belongs to no window, so that a script that makes many keeps none open.
     """
 
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
-        FigureCanvasAgg(self)
-
     def _repr_png_(self) -> bytes:
-        file = io.BytesIO()
-        self.savefig(file, format="png", dpi=DPI)
+        file, figure = io.BytesIO(), cast("Any", self)
+        figure.savefig(file, format="png", dpi=DPI)
         return file.getvalue()
