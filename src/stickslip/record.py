@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import math
 import os
@@ -121,10 +120,11 @@ class Record:
         InputError
             If the record has no such channel.
         """
-        plots = importlib.import_module("stickslip.report.plots")
-        figures = importlib.import_module("stickslip.report.record_figure")
-        with plots.house_style():
-            return figures.record_figure(self, channels)
+        import stickslip
+
+        return stickslip.record_figure(
+            self, channels
+        )  # the package knows the room that draws; records lie below it
 
     @arguments_checked
     def save(self, path: str | os.PathLike[str]) -> Path:

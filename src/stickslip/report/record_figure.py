@@ -57,7 +57,8 @@ def record_figure(record: Record, channels: Sequence[str] = ()) -> Any:
     span = (
         f"{record.time[0]:.4g} to {record.time[-1]:.4g} s, {len(record)} rows" if len(record) else "no rows"
     )
-    return plots.figure_of(what.capitalize(), span, panels, HEIGHT)
+    with plots.house_style():
+        return plots.figure_of(what.capitalize(), span, panels, HEIGHT)
 
 
 def _panel(record: Record, values: dict[str, plots.Array], unit: str) -> Panel:
