@@ -39,6 +39,7 @@ html_theme = "furo"
 html_title = f"stickslip {version}"
 html_static_path = ["_static"]
 html_css_files = ["page.css"]
+html_extra_path = ["llms.txt"]
 html_math_renderer = "mathml"  # no script, no network: the browser draws it
 html_copy_source = False
 html_show_sphinx = False

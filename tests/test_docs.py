@@ -112,6 +112,25 @@ def test_the_page_on_the_library_does_what_it_says(tmp_path: Path) -> None:
     assert (tmp_path / "c" / "model.c").exists()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "page",
+    ["index", "symptoms", "glossary", "howto/record_a_log", "howto/nothing_recommended"],
+)
+def test_the_pages_for_a_start_do_what_they_say(page: str, tmp_path: Path) -> None:
+    command = [sys.executable, str(DOCS / "_ext" / "sessions.py"), str(DOCS / f"{page}.md"), str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_list_for_language_models_names_pages_that_there_are() -> None:
+    text = (DOCS / "llms.txt").read_text(encoding="utf-8")
+    named = re.findall(r"\]\(([^)]*)\.html\)", text)
+    assert named
+    for page in named:
+        assert (DOCS / f"{page}.md").exists(), page
+
+
 def test_a_page_that_shows_what_is_not_printed_is_refused(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("```python\nprint(1 + 1)\n```\n\n```text\n3\n```\n")

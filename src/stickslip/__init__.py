@@ -79,6 +79,7 @@ _HOME = {
         "model": "Model Reference",
         "plugins": "law law_names",
         "record": "Record",
+        "report.record_figure": "record_figure",
         "simulation.closed_loop": "simulate",
         "simulation.prescribed.open_loop": "respond",
         "spec": "Law Mode Par",

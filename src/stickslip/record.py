@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -84,6 +85,47 @@ class Record:
         listed = ", ".join(f"{name} [{self.units[name]}]" for name in self.channels)
         return f"<Record: {len(self)} rows{span}; {listed}>"
 
+    def _repr_html_(self) -> str:
+        """The channels with their units and ranges in a notebook, and the metrics of a simulation."""
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td>{escape(self.units[name])}</td>"
+            + "".join(f"<td>{x:.4g}</td>" for x in _range(values))
+            + "</tr>"
+            for name, values in self.channels.items()
+        )
+        head = "".join(f"<th>{h}</th>" for h in ("channel", "unit", "least", "greatest"))
+        span = f", {self.time[0]:.6g} to {self.time[-1]:.6g} s" if len(self) else ""
+        metrics = cast("Mapping[str, float]", self.meta.get("metrics") or {})
+        listed = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items() if math.isfinite(value))
+        more = f"<details><summary>metrics</summary>{escape(listed)}</details>" if listed else ""
+        table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+        return f"<div><b>Record</b>: {len(self)} rows{span}{table}{more}</div>"
+
+    @arguments_checked
+    def plot(self, *channels: str) -> Any:
+        """Draw channels over time, one panel a unit, and the position error if the record has a reference.
+
+        Parameters
+        ----------
+        *channels : str
+            Names of channels; positions, velocities and torques, unless given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A notebook shows it; its ``savefig("run.png")`` writes it.
+
+        Raises
+        ------
+        InputError
+            If the record has no such channel.
+        """
+        import stickslip
+
+        return stickslip.record_figure(
+            self, channels
+        )  # the package knows the room that draws; records lie below it
+
     @arguments_checked
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the record as .npz: arrays, and units and meta as JSON (no pickle). Returns the path.
@@ -147,6 +189,12 @@ class Record:
         frame = pandas.DataFrame(dict(self.channels), index=pandas.Index(self.time, name="time"))
         frame.attrs.update(units=dict(self.units), meta=dict(self.meta))
         return frame
+
+
+def _range(values: Array) -> tuple[float, float]:
+    """The least and the greatest finite value; NaN if there is none."""
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if known.size else (math.nan, math.nan)
 
 
 def _header(text: str) -> tuple[dict[str, str], dict[str, Any]]:

@@ -85,7 +85,7 @@ def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
     # Feedback that cancels everything hunts (thesis 3.2.3), and is found to.
     full = [c for c in result["candidates"] if (c["kind"], c["gain"]) == ("feedback", 1.0)]
     assert any(c["unsafe"] for c in full)
-    assert main(["recommend", str(model), *options]) == 0
+    assert main(["recommend", str(model), *options, "--all"]) == 0
     shown = capsys.readouterr().out
     assert "switch on:" in shown
     assert "75 % interval" in shown
@@ -111,7 +111,7 @@ def test_the_margin_that_is_printed_is_what_the_table_says(
     monkeypatch.setattr("stickslip.recommend.recommend.LEADS", (0.0,))
     monkeypatch.setattr("stickslip.recommend.recommend.BEYOND", (1.5, 2.5))
     model = written(tmp_path / "m.toml", law="coulomb")
-    assert main(["recommend", str(model), "--bandwidth", "20", "--axes", "1", "--confirm", "0"]) == 0
+    assert main(["recommend", str(model), "--bandwidth", "20", "--axes", "1", "--confirm", "0", "--all"]) == 0
     lines = capsys.readouterr().out.splitlines()
     said = next(line for line in lines if line.startswith("gain margin:"))
     rows = [line.split() for line in lines if line.startswith("coulomb         feedforward")]

@@ -85,7 +85,7 @@ def test_the_answer_is_that_with_all_candidates_finished(
 
     def answer() -> tuple[RecommendationResult, list[str]]:
         advice = RecommendationResult(recommend(found, drive, axes=2, confirm=3), found)
-        return advice, str(advice).splitlines()
+        return advice, advice.details.splitlines()
 
     early, said = answer()
     judged = Bench.judged

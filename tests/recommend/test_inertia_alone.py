@@ -61,7 +61,7 @@ def test_where_friction_compensation_adds_nothing_the_inertia_feedforward_is_rec
     assert not advice.chosen.setting.compensates
     assert advice.recommendation.inertia_alone == advice.chosen
     assert advice.confidence == pytest.approx(5.0 / 7.0)
-    said = str(advice)
+    said = advice.details
     assert "switch on:         inertia feedforward alone, without friction compensation\n" in said
     assert "inertia alone   feedforward      0 " in said
     assert (
@@ -89,7 +89,7 @@ def test_what_friction_compensation_adds_to_the_inertia_feedforward_is_said() ->
     given, beyond = (
         round(100.0 * (1.0 - e)) for e in (alone.errors[0], advice.chosen.errors[0] / alone.errors[0])
     )
-    (line,) = [line for line in str(advice).splitlines() if line.startswith("of this:")]
+    (line,) = [line for line in advice.details.splitlines() if line.startswith("of this:")]
     assert f"inertia feedforward alone gives {given} % on the best estimate" in line
     assert f"friction compensation takes {beyond} %" in line
     assert "not surely" not in line

@@ -155,7 +155,7 @@ def test_a_drive_that_cannot_move_the_axis_is_refused(monkeypatch: pytest.Monkey
     stuck = sum(plant.friction.parameters.fs > 0.336 for plant in drawn)
     assert 0 < stuck < 5
     assert advice.notes[0].startswith(
-        f"On {stuck} of 5 axes the torque limit of the drive lies below their friction"
+        f"On {stuck} of 5 axes the torque limit of the drive is below their friction"
     )
 
 

@@ -14,7 +14,9 @@ from test_recommend_axes import estimate
 from stickslip import plugins
 from stickslip.control.belief import believed
 from stickslip.control.catalogue import CATALOGUE, compensated
+from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
+from stickslip.control.linear import Gains
 from stickslip.errors import InputError, ParameterError, UnknownName
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.contact import Contact
@@ -182,8 +184,15 @@ def test_a_limit_cycle_is_as_large_as_what_rises_and_falls_again(monkeypatch, cy
     position = 0.5 * swing * np.cos(2.0 * math.pi * cycles * np.linspace(0.0, 1.0, seen))
     monkeypatch.setattr(long_rest, "simulated", lambda *_: position)
     before = beside.Trial({"position_rms_rad": 1e-6}, position, position, drive.sample_time)
-    bench = SimpleNamespace(drive=drive, plants=[None], before=lambda _: before, ran=lambda: None)
-    assert beside.limit_cycle(None, bench, 0) == said
+    bench = SimpleNamespace(
+        drive=drive,
+        plants=[None],
+        before=lambda _: before,
+        ran=lambda: None,
+        longest_rest=0.0,
+        hunted_within=0.0,
+    )
+    assert beside.limit_cycle(Controller(Gains(1.0), sample_time=drive.sample_time), bench, 0) == said
 
 
 def test_what_is_switched_on_tells_what_it_learned_with_its_uncertainty():

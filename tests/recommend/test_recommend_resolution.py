@@ -87,7 +87,7 @@ def test_the_result_and_its_file_state_the_encoder(
     monkeypatch.setattr(verb, "identified_of", lambda _: seen(COUNT))
     advice = ss.recommend(tmp_path / "model.toml", bandwidth=20.0, amplitude=0.5, axes=1, confirm=1, **given)
     (note,) = [n for n in advice.notes if n.startswith(f"Simulated with {said}")]
-    assert note in str(advice)
+    assert note in advice.details
     assert advice.as_dict()["drive"]["encoder_counts"] == counts
     assert advice.loop.encoder_counts == counts
     file = advice.save(tmp_path / "recommended.toml")

@@ -17,7 +17,7 @@ from stickslip.report.styles import REFERENCE
 )
 def test_labels_of_a_logarithmic_axis_do_not_overlap_at_half_width(low: float, high: float) -> None:
     curve = plots.Curve(np.array([low, high]), np.array([0.0, 1.0]), "", REFERENCE)
-    figure = plots._figure("title", "message", [plots.Panel([curve], "y", "x", x_scale="log")], 2.0)
+    figure = plots.figure_of("title", "message", [plots.Panel([curve], "y", "x", x_scale="log")], 2.0)
     figure.canvas.draw()
     axes = figure.axes[0]
     left, right = axes.get_xlim()

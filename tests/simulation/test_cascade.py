@@ -69,13 +69,24 @@ def test_the_integral_rests_at_the_limit() -> None:
     assert [turned[990] for turned in limited] == [0.4] * 2
 
 
-def test_a_cascade_needs_samples() -> None:
-    with pytest.raises(ParameterError, match="a cascade needs a sampled controller; give a sample_time"):
-        Controller(LOOP)
-    with pytest.raises(
-        ParameterError, match="a velocity_filter needs a sampled controller; give a sample_time"
+def test_a_cascade_needs_samples_which_a_machine_has() -> None:
+    axis, slow = (
+        ss.RigidAxis(1e-3, ss.Model("coulomb", fc=0.1)),
+        ss.Reference("sine", amplitude=0.1, frequency=1.0),
+    )
+    for name, unsampled in (
+        ("a cascade", Controller(LOOP)),
+        ("a velocity_filter", Controller(Gains(1.0), velocity_filter=50.0)),
     ):
-        Controller(Gains(1.0), velocity_filter=50.0)
+        said = f"{name} needs a sampled controller; give a sample_time greater than 0, or run it on a machine"
+        with pytest.raises(ParameterError, match=said):
+            ss.simulate(axis, unsampled, slow, 0.1)
+    machine = ss.load_machine("thesis-dry")
+    one, other = (
+        ss.simulate(machine, Controller(LOOP, sample_time=time), slow, 0.2)["position"]
+        for time in (0.0, machine.sample_time)
+    )
+    assert np.array_equal(one, other)
     with pytest.raises(ParameterError, match=r"velocity_filter = -1 Hz"):
         Controller(Gains(1.0), sample_time=T, velocity_filter=-1.0)
 

@@ -59,7 +59,10 @@ def run(args: argparse.Namespace) -> int:
             str(args.out),
             *(["--force"] if args.force else []),
         ],
-        ["recommend", model, "--bandwidth", "20", "--counts-per-rev", "65536", "--torque-limit", "3"],
+        [
+            *("recommend", model, "--bandwidth", "20", "--counts-per-rev", "65536", "--torque-limit", "3"),
+            *("--out", str(args.out / "recommended.toml"), *(["--force"] if args.force else [])),
+        ],
     ):
         print(f"\n$ stickslip {' '.join(words)}", flush=True)
         if code := step(words):

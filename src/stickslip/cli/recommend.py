@@ -15,7 +15,8 @@ never rests is begun and braked smoothly, which is not judged. Sampling is that 
 has a limit cycle on none of these axes; of those within a tenth of the smallest error on the worst axis, it is the one
 with the lowest gain; where friction compensation takes less than a tenth of what the inertia feedforward alone leaves,
 it is that alone. It is then simulated on further sampled axes; the error reduction printed is the one found there.
-A candidate is simulated on more axes only while it can still be the best; the table marks those that were stopped.
+A candidate is simulated on more axes only while it can still be the best; the table of --all marks those that were
+stopped. The report shows the error before and after, what to set, margins, what was not simulated and when to repeat.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from stickslip.verbs.recommendation import RecommendationResult
 
 SUMMARY = "recommend a compensator for an identified model"
+RECOMMENDED = "recommended.toml"
+"""The setting's file in the commands of a report, if none is written."""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,9 +51,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FILE.toml",
-        help="write the recommended setting, for `stickslip export`",
+        help="write the recommended setting, for `stickslip export`, and a report beside it (FILE.html)",
+    )
+    parser.add_argument(
+        "--report", type=Path, metavar="FILE.html", help="write the report: verdict, plots, margins, limits"
     )
     _files.force_argument(parser)
+    parser.add_argument("--all", action="store_true", help="print all candidates, parameters and notes")
     parser.add_argument("--json", action="store_true", help="print the result and all candidates as JSON")
 
 
@@ -166,9 +173,11 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.cli import _output
     from stickslip.verbs.recommend import recommend
 
-    if args.out:
-        writable(args.out, args.model)
-        _files.refuse_foreign([args.out], args.force)
+    report: Path | None = args.report or (args.out.with_suffix(".html") if args.out else None)
+    for option, target in (("--out", args.out), ("--report", report)):
+        if target:
+            writable(target, args.model, option)
+            _files.refuse_foreign([target], args.force)
     with _output.progress_bar("simulating") as progress:
         result = recommend(
             args.model, bandwidth=args.bandwidth, damping=args.damping, linear=args.linear, loop=args.loop,
@@ -186,12 +195,23 @@ def run(args: argparse.Namespace) -> int:
     elif args.out:
         which = "the earlier recommendation in it was removed" if removed else "it is not written"
         print(f"stickslip: --out {args.out}: nothing is recommended, so {which}", file=sys.stderr)
+    made = {
+        "recommended": written,
+        "report": result.report(report, args.out or RECOMMENDED) if report else None,
+    }
     if args.json:
-        _output.print_json({**result.as_dict(), "file": str(written) if written else None})
+        files = {"file": str(written) if written else None, "report_file": str(report) if report else None}
+        _output.print_json({**result.as_dict(), **files})
         return 0
-    print(result)
+    print(result.details if args.all else result)
+    for what, path in made.items():
+        if path:
+            print(f"{what}: {path}")
+    if not args.all:
+        print(
+            "more: --all prints every candidate, the parameters and the notes; --report FILE.html writes a page"
+        )
     if written:
-        print(f"recommended: {written}")
         whole = args.controller or result.recommendation.instead
         what = "--controller" if whole else "--compensator recommended"
         print(f"next: stickslip export {shlex.quote(str(written))} --to c99 {what}")
@@ -216,7 +236,7 @@ def store(out: Path, result: RecommendationResult) -> tuple[Path | None, bool]:
     return None, False
 
 
-def writable(out: Path, model: Path) -> None:
+def writable(out: Path, model: Path, option: str) -> None:
     """Refuse before the simulations what cannot be written after them.
 
     Raises
@@ -226,10 +246,9 @@ def writable(out: Path, model: Path) -> None:
     from stickslip.errors import InputError
     from stickslip.whole_files import prepared_folder
 
+    name = RECOMMENDED if option == "--out" else "recommendation.html"
     if os.path.realpath(out) == os.path.realpath(model):
-        raise InputError(f"--out {out} is the model itself; give another name, such as recommended.toml")
+        raise InputError(f"{option} {out} is the model itself; give another name, such as {name}")
     if out.is_dir():
-        raise InputError(
-            f"--out {out} is a folder; give the name of a file, such as {out / 'recommended.toml'}"
-        )
+        raise InputError(f"{option} {out} is a folder; give the name of a file, such as {out / name}")
     prepared_folder(out.parent)

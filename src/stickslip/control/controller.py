@@ -16,7 +16,7 @@ from stickslip.control.composed import Composed
 from stickslip.control.continuous import Continuous, continuous_form, refuse_windup
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import ReferenceVelocity
-from stickslip.control.short_form import laws_meant, refuse_short
+from stickslip.control.short_form import laws_meant, refuse_continuous, refuse_short
 from stickslip.control_spec import PLACES, ControlLaw
 from stickslip.errors import ModelRemark, ParameterError
 from stickslip.model import Model, level_of_caller
@@ -47,7 +47,8 @@ class Controller(Composed):
     Parameters
     ----------
     gains : Gains or Cascade, optional
-        Of the linear part (`stickslip.control.linear`); a cascade needs a sample time.
+        Of the linear part (`stickslip.control.linear`). A cascade acts on samples: without a sample time it runs on a
+        machine, at the machine's.
     compensator : Compensator, optional
         A friction law on the reference (`Feedforward`) or on the measurement (`Feedback`).
     torque_limit : float
@@ -58,8 +59,8 @@ class Controller(Composed):
         Counts per revolution of the encoder that a sampled controller reads; 0 measures exactly. Of a linear axis the
         counts in 2π m: 2π over the scale's step in m.
     velocity_filter : float
-        Corner of a first-order low-pass on the velocity that the linear part sees, Hz; 0 for none. Only with a sample
-        time.
+        Corner of a first-order low-pass on the velocity that the linear part sees, Hz; 0 for none. It acts on
+        samples, as a cascade does.
     loop : ControlBlock or sequence of ControlBlock, optional
         The control loop instead of gains: PD, PID, ...
     feedforward, observer : ControlBlock or sequence of ControlBlock, optional
@@ -244,6 +245,7 @@ class Controller(Composed):
         ParameterError
             If one of its laws acts on samples only.
         """
+        refuse_continuous(self.gains, self.velocity_filter)
         found = continuous_form(self.blocks)
         if not self.is_short:
             refuse_windup(found, self.torque_limit)

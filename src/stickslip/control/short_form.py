@@ -23,7 +23,7 @@ def highest_corner(sample_time: float) -> float:
 
 
 def refuse_short(gains: Any, compensator: Any, velocity_filter: float, sample_time: float) -> None:
-    """Refuse numbers out of bounds, and what acts on samples where there are none.
+    """Refuse numbers out of bounds, and compensators that act on samples where there are none.
 
     Raises
     ------
@@ -42,13 +42,29 @@ def refuse_short(gains: Any, compensator: Any, velocity_filter: float, sample_ti
             f"{compensator.name}: filter_hz = {corner:g} Hz is too high for a sample time of {sample_time:g} "
             f"s; give at most {highest_corner(sample_time):g} Hz, or none"
         )
-    on_samples = {"a cascade": isinstance(gains, Cascade), "a velocity_filter": velocity_filter > 0.0}
-    names = [name for name, given in on_samples.items() if given]
-    names += compensator.sampled if compensator else ()
+    names = compensator.sampled if compensator else ()
     if sample_time == 0.0 and names:
         raise ParameterError(
             f"controller: {names[0]} needs a sampled controller; give a sample_time greater than 0"
         )
+
+
+def refuse_continuous(gains: Any, velocity_filter: float) -> None:
+    """Refuse to run a cascade or a velocity filter in continuous time.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for name, given in (
+        ("a cascade", isinstance(gains, Cascade)),
+        ("a velocity_filter", velocity_filter > 0.0),
+    ):
+        if given:
+            raise ParameterError(
+                f"controller: {name} needs a sampled controller; give a sample_time greater than 0, or run it on a "
+                "machine, which has its own"
+            )
 
 
 def laws_meant(

@@ -1,6 +1,6 @@
 """The axis as a two-mass system: a motor and a load with a spring between them, such as a belt, a long shaft or a gear.
 
-Motor torque acts on the motor, friction on the load, and the encoder sits on either.
+Motor torque acts on the motor, the contact's friction on the load, the bearings' at the encoder, which is on either.
 """
 
 from __future__ import annotations
@@ -23,6 +23,10 @@ ENCODERS = ("motor", "load")
 @dataclass(frozen=True)
 class TwoMassAxis(Train):
     """Motor and load with a spring between them.
+
+    The friction of `Contact` acts on the load. Friction on the motor: `Contact.bearings` (Coulomb and viscous) acts at
+    the inertia with the encoder, so that with ``encoder="motor"`` a machine has friction on both, and with a contact of
+    little friction on the motor alone. A record of `simulate` has ``motor_position`` and ``load_position``.
 
     Attributes
     ----------

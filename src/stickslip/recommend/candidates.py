@@ -209,7 +209,8 @@ class Bench:
     """Axes, each with what the linear controller alone does on it, and the laws that may be switched on.
 
     `ran` is called after every axis that was simulated. `left_out` are axes that were drawn and not held; `rested` is
-    what the linear controller alone swings by at rest for long, once it is known.
+    what the linear controller alone swings by at rest for long, once it is known; `longest_rest` is the longest rest
+    that was simulated, and `hunted_within` the longest in which an axis hunted, s.
     """
 
     def __init__(
@@ -220,6 +221,7 @@ class Bench:
         self.alone: list[Trial | str] = []
         self.left_out: list[RigidAxis] = []
         self.rested: list[float] | None = None
+        self.longest_rest = self.hunted_within = 0.0
         self._moved: dict[Setting, dict[int, Moved]] = {}
         self._swings_on: dict[tuple[Setting, int], bool] = {}
         self._pushed: dict[int, AfterPushes] = {}

@@ -9,44 +9,76 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.control.controller import Controller
+from stickslip.control.linear import Cascade
 from stickslip.identify.fit.parallel import in_turn
 from stickslip.identify.identified_file import Identified
+from stickslip.machines.rigid import RigidAxis
 from stickslip.recommend.candidate_run import Trial
-from stickslip.recommend.candidates import Bench
+from stickslip.recommend.candidates import Bench, breakaway
 from stickslip.recommend.following import simulated
 from stickslip.recommend.ringing import against_friction, integral_of
 from stickslip.recommend.swings import back_and_forth, between_counts
 
 RESTS = 20.0
 """s at rest, of which the second half is judged: an integral that is reset on a soft contact cycles in 6 to 12 s."""
+LONGEST = 120.0
+"""s at rest at most; a loop that needs longer to break away creeps rather than hunts."""
+CYCLES = 4.0
+"""Times the integral's time to break away: two of them are a cycle, and the second half of the rest is judged."""
 OFF = (0.0, 1.0)
 """Times its error along the motion, by which the reference then moves on, for each of two rests."""
 MORE = 1.5
 """Times the linear controller's widest swing, from which on a compensator is what hunts."""
-HUNTS = f"hunts at rest within {RESTS:g} s"
+HUNTS = "hunts at rest"
 ASKED = 8
 """Axes on which a loop with an integral part rests for so long."""
 
 
 def swing_for_long(controller: Controller, bench: Bench, axis: int, off: float = 0.0) -> float:
-    """What it goes to and fro by at rest long after the motion on one of the axes, rad; 0 where that is within an
-    encoder's counts or a part of the linear controller's error, infinite where it diverges.
+    """Return by how much an axis goes back and forth at rest long after the motion, rad.
 
-    It rests `off` times that error beside where the motion ends: an integral that stops near there by luck would break
-    away much later.
+    0 if that is within an encoder's counts or a part of the linear controller's error; infinite if it diverges. The
+    reference rests `off` times that error beside the end of the motion: an integral that stops near there by luck would
+    break away much later. The rest lasts `RESTS`, or longer where the integral needs longer to break the axis away
+    (`time_to_break_away`).
     """
-    drive, before = bench.drive, bench.before(axis)
+    drive, before, plant = bench.drive, bench.before(axis), bench.plants[axis]
     assert isinstance(before, Trial)
     last = drive.reference[-1] * np.array([1.0, 0.0, 0.0])
     last[0] += off * before.moving["position_rms_rad"]
-    held = np.tile(last, (round(RESTS / drive.sample_time), 1))
-    position = simulated(bench.plants[axis], controller, np.vstack([drive.reference, held]))
-    bench.ran()
-    if position is None:
-        return math.inf
-    swing = back_and_forth(position[-held.shape[0] // 2 :])
     most = max(before.swing(drive), between_counts(drive.encoder_counts))
-    return swing if swing > most else 0.0
+    rest, needed = 0.0, RESTS
+    while rest < min(needed, LONGEST):
+        rest = min(needed, LONGEST)
+        held = np.tile(last, (round(rest / drive.sample_time), 1))
+        position = simulated(plant, controller, np.vstack([drive.reference, held]))
+        bench.ran()
+        bench.longest_rest = max(bench.longest_rest, rest)
+        if position is None:
+            bench.hunted_within = max(bench.hunted_within, rest)
+            return math.inf
+        swing = back_and_forth(position[-held.shape[0] // 2 :])
+        if swing > most:
+            bench.hunted_within = max(bench.hunted_within, rest)
+            return swing
+        error = float(last[0] - position[-1])
+        needed = RESTS + CYCLES * time_to_break_away(
+            controller, plant, error, drive.deadband(1.0) * drive.sample_time
+        )
+    return 0.0
+
+
+def time_to_break_away(controller: Controller, plant: RigidAxis, error: float, count: float) -> float:
+    """Return how long the integral of a loop takes to move a sticking axis the other way, s.
+
+    0 for a loop without gains or integral, and for an error (rad) that is within an encoder's count: such an integral
+    stands still.
+    """
+    gains = controller.gains
+    if gains is None or abs(error) <= count or error == 0.0:
+        return 0.0
+    rate = gains.kvi * gains.kv if isinstance(gains, Cascade) else gains.ki
+    return 2.0 * breakaway(plant.friction) / (rate * abs(error)) if rate > 0.0 else 0.0
 
 
 def swings_for_long(controller: Controller, bench: Bench) -> Iterator[float]:
@@ -96,7 +128,18 @@ def hunts_alone(bench: Bench, torque: str) -> str:
     )
     widest, unit = max(found), "m" if torque == "N" else "rad"
     size = f"by up to {widest:.2g} {unit} peak to peak" if math.isfinite(widest) else "it diverges"
-    return f"at rest {on} within {RESTS:g} s ({size}): {why}"
+    return f"at rest {on} within {bench.hunted_within:g} s ({size}): {why}"
+
+
+def rest_words(bench: Bench) -> str:
+    """Return whether the linear controller alone hunts at rest, in words."""
+    if not integrates(bench.linear):
+        return "the loop alone has no integral part and cannot hunt"
+    swings = alone_for_long(bench)
+    on = f"{len(swings)} axes" if len(swings) > 1 else "the best estimate"
+    if hunting := sum(swing > 0.0 for swing in swings):
+        return f"the loop alone hunts on {f'{hunting} of ' if len(swings) > 1 else ''}{on}"
+    return f"the loop alone does not hunt on {on} in {bench.longest_rest:g} s at rest"
 
 
 def long_rests(loop: Controller) -> int:

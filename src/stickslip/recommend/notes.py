@@ -111,18 +111,19 @@ def lag_words(gains: Gains | Cascade | None) -> str:
     )
 
 
-def weak_on(plants: Sequence[RigidAxis], drive: Drive) -> str:
-    """On how many axes the friction is above the torque limit; empty where on none."""
+def beyond_torque_limit(plants: Sequence[RigidAxis], drive: Drive) -> Iterator[str]:
+    """Yield on how many axes the friction is above the torque limit; nothing if on none."""
     count = sum(resistance(plant.friction, drive) >= drive.torque_limit for plant in plants)
-    return f"{count} of {len(plants)}" if count else ""
+    if count:
+        yield (
+            f"On {count} of {len(plants)} axes the torque limit of the drive is below their friction, though not below "
+            "that of the best estimate: they do not follow."
+        )
 
 
-def notes_on(found: Identified, result: Recommendation, weak: str = "") -> Iterator[str]:
-    """Yield the notes on the model and on the recommendation; `weak` is from `weak_on`."""
+def notes_on(found: Identified, result: Recommendation) -> Iterator[str]:
+    """Yield the notes on the model and on the recommendation."""
     chosen, candidates = result.chosen, result.candidates
-    if weak:
-        limit = "the torque limit of the drive lies below their friction"
-        yield f"On {weak} axes {limit}, though not below that of the best estimate: they do not follow."
     if float(found.axis.get("gravity", 0.0) or 0.0):
         yield (
             "The pendulum's weight is not part of the setting: the error that it makes is in the numbers above. Less "
@@ -203,20 +204,27 @@ def better_than_simulated(machine: Machine | None, train: TwoInertias | None) ->
     return BETTER if train is None or machine is not None else BETTER_AT_MOTOR
 
 
+def not_simulated(machine: Machine | None, train: TwoInertias | None) -> tuple[str, ...]:
+    """Return the effects that the simulations leave out."""
+    if machine is not None:
+        return (f"what the file of machine {machine.name} leaves out",)
+    return ("resonances" if train is None else "further resonances", "backlash", "noise in the current")
+
+
 def _simulated(machine: Machine | None, train: TwoInertias | None, delay: float | None) -> str:
-    """What was simulated, what was not, and how the interval allows for that."""
-    axis, beside = "a rigid axis", "resonances"
+    """Return what was simulated, what was not, and how the interval allows for that."""
+    axis = "a rigid axis"
     if train is not None:
         axis = (
             f"motor and load behind a spring as identified (they resonate at {train.resonance:.3g} Hz; friction at the "
             "load)"
         )
-        beside = "further resonances"
     late = "up to a sample" if delay is None else f"{delay:g} samples"
+    *most, last = not_simulated(machine, train)
     simulated = (
         f"Simulated with {axis}, a current loop, {late} of delay, friction that comes late as "
-        f"behind an elastic drivetrain, and position-dependent torques as large as the model's misfit; {beside}, "
-        "backlash and noise in the current are not in it (in place of noise a feedback is pushed at rest): for them"
+        f"behind an elastic drivetrain, and position-dependent torques as large as the model's misfit; "
+        f"{', '.join(most)} and {last} are not in it (in place of noise a feedback is pushed at rest): for them"
     )
     if machine is not None:
         simulated = (

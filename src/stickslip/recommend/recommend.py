@@ -19,7 +19,7 @@ from stickslip.messages import Note
 from stickslip.model import Model
 from stickslip.recommend.axes import plants_of
 from stickslip.recommend.beside import Own, belief_of, limit_cycle, tried_beside
-from stickslip.recommend.candidate_run import Drive
+from stickslip.recommend.candidate_run import Drive, Trial, run
 from stickslip.recommend.candidates import (
     NEAR,
     TRIES,
@@ -31,7 +31,7 @@ from stickslip.recommend.candidates import (
     rings_alone,
 )
 from stickslip.recommend.late import hardly_damped_where_late, refuse_late, seconds_meant
-from stickslip.recommend.long_rest import hunts_alone, hunts_with, long_rests, unsure_at_rest
+from stickslip.recommend.long_rest import hunts_alone, hunts_with, long_rests, rest_words, unsure_at_rest
 from stickslip.recommend.motion_notes import by_attribute, on_motion
 from stickslip.recommend.notes import (
     ALLOWANCE,
@@ -39,15 +39,15 @@ from stickslip.recommend.notes import (
     axes_left_out,
     better_than_simulated,
     beyond_inertia,
+    beyond_torque_limit,
     interval_allows,
     lag_of,
     notes_on,
     sampled_as,
-    weak_on,
 )
 from stickslip.recommend.plant import Plant
 from stickslip.recommend.question import cautious, inertia_of, laws_of, with_motion
-from stickslip.recommend.recommendation import Recommendation
+from stickslip.recommend.recommendation import Comparison, Recommendation
 from stickslip.recommend.refusals import (
     held,
     refuse_endless,
@@ -151,15 +151,49 @@ def recommend(
     )  # fmt: skip
     if chosen is None and result.instead is None:
         result = replace(result, why_none=why_refused(found, result.candidates, bench, others))
-    weak = weak_on([*bench.plants, *others.plants[1:]], drive)
-    notes = [
-        *sampled_as(drive, chosen, found.motion == "linear"), *on_motion(drive, found.unit("rad")),
-        *axes_left_out(bench, others, found), *seconds_meant(drive), *hardly_damped_where_late(found, drive, j),
-        *lag_of(bench.plants[0], first, linear, drive), *notes_on(found, result, weak),
-        *(() if rung else unsure_at_rest(found, linear)), *_reasons(found, result, bench, others),
-        *interval_allows(found, result),
+    warnings = [
+        *on_motion(drive, found.unit("rad")), *axes_left_out(bench, others, found), *seconds_meant(drive),
+        *hardly_damped_where_late(found, drive, j), *lag_of(bench.plants[0], first, linear, drive),
+        *beyond_torque_limit([*bench.plants, *others.plants[1:]], drive),
+        *(() if rung else unsure_at_rest(found, linear)),
     ]  # fmt: skip
-    return replace(result, notes=tuple(notes))
+    notes = [
+        *sampled_as(drive, chosen, found.motion == "linear"), *warnings, *notes_on(found, result),
+        *_reasons(found, result, bench, others), *interval_allows(found, result),
+    ]  # fmt: skip
+    comparisons = tuple(compared(result, first, bench, others))
+    return replace(
+        result,
+        notes=tuple(notes),
+        warnings=tuple(warnings),
+        comparisons=comparisons,
+        hunting=rest_words(told),
+    )
+
+
+def compared(result: Recommendation, first: Trial, bench: Bench, others: Bench) -> Iterator[Comparison]:
+    """Run what is recommended on the best estimate and on the sampled axis with the most error left.
+
+    `first` is the linear controller alone on the best estimate.
+    """
+    instead, chosen = result.instead, result.switched_on
+    if instead is not None and instead.controller is not None:
+        controller = instead.controller
+        there = others if instead.confirmed else bench
+    elif chosen is not None:
+        controller = chosen.setting.on(bench.linear, bench.laws[chosen.setting.law])
+        there = others
+    else:
+        yield Comparison("best estimate", first)
+        return
+    worst = max(range(len(result.errors)), key=lambda i: result.errors[i])
+    axes = {"best estimate": (bench, 0)}
+    if worst > 0:
+        axes[f"worst of {len(result.errors) - 1} sampled axes"] = (there, worst)
+    for name, (where, i) in axes.items():
+        before, after = where.before(i), run(where.plants[i], controller, result.drive)
+        if isinstance(before, Trial) and isinstance(after, Trial):
+            yield Comparison(name, before, after)
 
 
 def _reasons(found: Identified, result: Recommendation, bench: Bench, others: Bench) -> Iterator[str]:

@@ -10,12 +10,37 @@ from typing import Any
 from stickslip.messages import render, rendered
 from stickslip.model import Model
 from stickslip.recommend.beside import Beside
-from stickslip.recommend.candidate_run import Drive
+from stickslip.recommend.candidate_run import Drive, Trial
 from stickslip.recommend.candidates import NEAR, Candidate
 
 ALLOWANCE, BETTER = 1.4, 2.0
 """Factors on the error left, upwards and downwards, for resonances, backlash, cogging and the like, which a machine has
 or has not: so the promise held in `benchmarks/promise.py`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """One axis under the linear controller alone, and with what is recommended.
+
+    Attributes
+    ----------
+    axis : str
+        For people: "best estimate", or which sampled axis.
+    before : Trial
+        The linear controller alone.
+    after : Trial or None
+        With what is recommended; None if nothing is.
+    """
+
+    axis: str
+    before: Trial
+    after: Trial | None = None
+
+    @property
+    def errors(self) -> tuple[float, float]:
+        """RMS position errors before and after, rad (m); NaN for the latter if nothing is recommended."""
+        before, after = self.before.moving, self.after.moving if self.after else {}
+        return before["position_rms_rad"], after.get("position_rms_rad", math.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +84,12 @@ class Recommendation:
         the inertia feedforward alone. None where there is none.
     why_none : str
         The one reason why no compensator is recommended, and what to do; empty where one is.
+    warnings : tuple of str
+        Those of the notes that limit the answer or ask for an action.
+    comparisons : tuple of Comparison
+        The best estimate and, if something is recommended, the sampled axis on which the most of the error is left.
+    hunting : str
+        Whether the linear controller alone hunts at rest, and how long that was simulated.
     """
 
     chosen: Candidate | None
@@ -79,6 +110,9 @@ class Recommendation:
     inertia_alone: Candidate | None = None
     friction: Candidate | None = None
     why_none: str = ""
+    warnings: tuple[str, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
+    hunting: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "notes", rendered(self.notes))
@@ -99,7 +133,7 @@ class Recommendation:
         return self.chosen if self.instead is None else None
 
     @property
-    def _errors(self) -> tuple[float, ...]:
+    def errors(self) -> tuple[float, ...]:
         """Errors left by what is recommended: the best estimate, and the axes that it was not picked on."""
         if self.instead is not None:
             return self.instead.confirmed or self.instead.errors
@@ -114,20 +148,20 @@ class Recommendation:
         little more: the best estimate may widen them. They are moved apart by `ALLOWANCE` and `better`,
         for what machines have and the simulation has not.
         """
-        if not self._errors:
+        if not self.errors:
             return 0.0, 0.0
-        return 1.0 - ALLOWANCE * max(self._errors), 1.0 - min(self._errors) / self.better
+        return 1.0 - ALLOWANCE * max(self.errors), 1.0 - min(self.errors) / self.better
 
     @property
     def usual_reduction(self) -> float:
         """The part of the error that is taken away at least on half of the axes that the setting was not picked on; NaN
         where it was confirmed on none."""
-        return 1.0 - median(self._errors[1:]) if self.confirmed_on > 0 else math.nan
+        return 1.0 - median(self.errors[1:]) if self.confirmed_on > 0 else math.nan
 
     @property
     def confirmed_on(self) -> int:
         """Number of drawn axes on which the recommendation was confirmed."""
-        return max(len(self._errors) - 1, 0)
+        return max(len(self.errors) - 1, 0)
 
     @property
     def confidence(self) -> float:
@@ -141,11 +175,12 @@ class Recommendation:
             "chosen": self.switched_on.as_dict() if self.switched_on else None,
             "model": self.model.as_dict() if self.model and self.switched_on else None, "gains": self.gains,
             "linear_error_rms": self.linear_error, "margin": self.margin, "unsafe_gain": self.unsafe_gain,
-            "reduction": list(self.reduction) if self._errors else None, "reduction_confidence": self.confidence,
+            "reduction": list(self.reduction) if self.errors else None, "reduction_confidence": self.confidence,
             "usual_reduction": self.usual_reduction if self.confirmed_on else None,
             "inertia_alone": self.inertia_alone.as_dict() if self.inertia_alone else None,
             "axes": self.axes, "axes_confirmed": self.confirmed_on, "notes": list(self.notes),
-            "linear_alone_rings": self.rings, "drive": self.drive.as_dict(),
+            "warnings": list(self.warnings), "errors_rms": {c.axis: list(c.errors) for c in self.comparisons},
+            "linear_alone_rings": self.rings, "hunting": self.hunting, "drive": self.drive.as_dict(),
             "candidates": [c.as_dict() for c in self.candidates],
             "compensators": [b.as_dict() for b in self.beside],
             "instead": self.instead.label if self.instead else None, "why_none": self.why_none,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import importlib
+import io
 import math
 import re
 import struct
@@ -185,9 +186,8 @@ def save(
     InputError
         If a file cannot be written.
     """
-    settings: Any = importlib.import_module("matplotlib").rc_context(RC)
-    with settings:
-        figure = _figure(title, message, panels, height)
+    with house_style():
+        figure = figure_of(title, message, panels, height)
         for target in targets:
             # No date in the file: the same study gives the same bytes.
             undated = {"metadata": {DATES[target.suffix]: None}} if target.suffix in DATES else {}
@@ -199,10 +199,27 @@ def save(
                 figure.savefig(draft, format=target.suffix[1:], dpi=DPI, **undated)
 
 
+def house_style() -> Any:
+    """Return the context in which Matplotlib draws and saves as all figures of the package are."""
+    return importlib.import_module("matplotlib").rc_context(RC)
+
+
+def embedded_figure(figure: Any) -> dict[str, Any]:
+    """Return a Matplotlib figure as the data URI of an SVG, and its size in pixels."""
+    file = io.BytesIO()
+    with house_style():
+        figure.savefig(file, format="svg", metadata={"Date": None})
+    return embedded_bytes(file.getvalue(), ".svg")
+
+
 def embedded(file: Path) -> dict[str, Any]:
     """An SVG, or a PNG of ours, as a data URI, and its size in pixels."""
-    data = file.read_bytes()
-    if file.suffix == ".png":
+    return embedded_bytes(file.read_bytes(), file.suffix)
+
+
+def embedded_bytes(data: bytes, suffix: str) -> dict[str, Any]:
+    """As `embedded`, of the content of a file whose name ends in `suffix`."""
+    if suffix == ".png":
         kind, (width, height) = "image/png", (72.0 / DPI * x for x in struct.unpack(">II", data[16:24]))
     else:
         kind, head = "image/svg+xml", data[:2000].decode("utf-8", "ignore")
@@ -216,9 +233,14 @@ def embedded(file: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _figure(title: str, message: str, panels: Sequence[Panel], height: float) -> Any:
+def figure_of(title: str, message: str, panels: Sequence[Panel], height: float = 2.0) -> Any:
+    """Return panels one above the other as a Matplotlib figure, without pyplot; arguments as of `draw`.
+
+    Within `house_style` it looks as all figures of the package. A notebook shows it.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+
+    from stickslip.report.shown_figure import ShownFigure
 
     common = [p for p in panels if not p.legend]
     named = dict.fromkeys(c.label for p in common for c in p.curves if c.label)
@@ -230,7 +252,7 @@ def _figure(title: str, message: str, panels: Sequence[Panel], height: float) ->
     head = 0.24 + 0.13 * (len(heading) + max(1, len(lines)))
     shared = len({p.x_label for p in panels if p.x_label}) == 1
     total = head + height * len(panels) + (0.26 if common or shared else 0.0) + 0.17 * rows
-    figure: Any = Figure(figsize=(WIDTH, total))
+    figure: Any = ShownFigure(figsize=(WIDTH, total))
     FigureCanvasAgg(figure)
     figure.text(0.02, 1.0 - 0.07 / total, "\n".join(heading), va="top", fontsize=8.0, fontweight="bold")
     figure.text(

@@ -5,14 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
+from stickslip.analyse.controller_margins import ControllerStability
+from stickslip.analyse.wording import quantity
 from stickslip.control.learned import told
+from stickslip.control.linear import Cascade
 from stickslip.control.registry import control_law
+from stickslip.identify.identified_file import Identified
 from stickslip.model import Model
 from stickslip.recommend.beside import Beside
 from stickslip.recommend.candidates import Candidate
 from stickslip.recommend.course import measured
-from stickslip.recommend.notes import ALLOWANCE
+from stickslip.recommend.notes import ALLOWANCE, not_simulated
 from stickslip.recommend.recommendation import Recommendation
+from stickslip.report.plots import one_prefix
 
 BEATEN = "not tried further: another one leaves less"
 
@@ -29,6 +34,144 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
         out.append(f"{x.label:<16}{x.kind:<13}{x.gain:>5.3g}  {x.deadband:>{wide}.3g}  {100 * c.errors[0]:>8.1f} %  "
               f"{worst_left(c):>7}  {mark}{safety(c)}")  # fmt: skip
     out.append("")
+    out.append(f"motion:            {motion_words(result, unit)}")
+    out.append(
+        f"linear controller: {gain_words(result, unit)}; RMS error alone {result.linear_error:.3g} {unit('rad')}"
+    )
+    if result.rings:
+        out.append(f"linear alone:      without a compensator it oscillates {result.rings}")
+        if result.chosen or result.instead:
+            out.append(
+                f"{'':19}below, safe means that the compensator adds no oscillation to this one; it does not end it"
+            )
+    return [*out, *beside_lines(result), *chosen_lines(result, unit), *result.notes]
+
+
+def summary_lines(
+    result: Recommendation, found: Identified, stability: ControllerStability | None = None
+) -> list[str]:
+    """Return the recommendation in about eight lines: setting, error, what it holds for, margins, warnings.
+
+    Parameters
+    ----------
+    result : Recommendation
+    found : Identified
+        The model that it was made for.
+    stability : ControllerStability, optional
+        Of the loop with what is recommended, about rest.
+    """
+    unit, comparisons = found.unit, result.comparisons
+    angle = unit("rad")
+    if result.why_none:
+        out = [f"switch on:         no friction compensator: {result.why_none}"]
+        out.append(
+            f"error:             {quantity(result.linear_error, angle)} RMS with the linear controller alone"
+        )
+    else:
+        out = [f"switch on:         {switched_on_words(result, unit)}"]
+        said = [f"{error_from_to(*c.errors, angle)} RMS ({c.axis})" for c in comparisons]
+        out.append(f"error:             {'; '.join(said)}")
+        out.append(f"error reduction:   {reduction_words(result)}")
+    out.append(f"loop:              {loop_words(result, unit)}")
+    out.append(f"motion:            {motion_words(result, unit)}")
+    if margins := list(margin_words(result, stability)):
+        out.append(f"margins:           {'; '.join(margins)}")
+    if result.hunting and not result.rings:
+        out.append(f"at rest:           {result.hunting}")
+    if result.rings:
+        out.append(f"linear alone:      without a compensator it oscillates {result.rings}")
+    missing = ", ".join(not_simulated(result.drive.machine, found.train))
+    out.append(
+        f"not simulated:     {missing}{'; the interval allows for them' if result.confirmed_on > 1 else ''}"
+    )
+    return [*out, *(f"warning:           {text}" for text in result.warnings)]
+
+
+def switched_on_words(result: Recommendation, unit: Callable[[str], str]) -> str:
+    """Return what is switched on, with the inertia and the constant torque that are fed forward too."""
+    if result.instead is not None:
+        return result.instead.label
+    assert result.chosen is not None
+    setting = result.chosen.setting
+    more = [f"lead {setting.lead:.3g} s"] if setting.lead else []
+    more += [f"dead band {setting.deadband:.3g} {unit('rad/s')}"] if setting.deadband else []
+    fed = ["inertia"] if setting.inertia_feedforward and setting.compensates else []
+    fed += ["constant torque"] if setting.offset else []
+    more += [f"{' and '.join(fed)} fed forward"] if fed else []
+    return ", ".join([setting.words, *more])
+
+
+def verdict(result: Recommendation, unit: Callable[[str], str]) -> str:
+    """Return the recommendation in one sentence."""
+    if result.why_none:
+        return f"Switch on no friction compensator: {result.why_none}."
+    first = result.comparisons[0]
+    promise = f", and by {percent(*result.reduction)} on the axis " if result.confirmed_on > 1 else " "
+    sure = f"({100.0 * result.confidence:.0f} % interval)" if result.confirmed_on > 1 else "(no interval)"
+    return (
+        f"Switch on {switched_on_words(result, unit)}: the RMS position error falls from "
+        f"{error_from_to(*first.errors, unit('rad'))} on the best estimate{promise}{sure}."
+    )
+
+
+def error_from_to(before: float, after: float, angle: str) -> str:
+    """Return two errors, rad (m), in one prefix: "48.8 to 0.34 mrad"."""
+    factor, prefix = one_prefix(before, after)
+    return f"{factor * before:.3g} to {factor * after:.3g} {prefix}{angle}"
+
+
+def reduction_words(result: Recommendation) -> str:
+    """Return the promised part of the error that is taken away."""
+    if result.confirmed_on < 2:
+        return "no interval (the law has none, or fewer than two axes were sampled)"
+    return (
+        f"{percent(*result.reduction)} ({100.0 * result.confidence:.0f} % interval), safe on all "
+        f"{result.confirmed_on} sampled axes"
+    )
+
+
+def margin_words(result: Recommendation, stability: ControllerStability | None) -> Iterator[str]:
+    """Yield the margin of the compensator's gain, and those of the loop while the axis slides."""
+    chosen = result.switched_on
+    if chosen is not None and chosen.setting.compensates:
+        yield f"compensator gain {margin(chosen, result)}"
+    if stability is None or not stability.is_linear:
+        return
+    sliding = stability.loops[1]
+    yield (
+        f"loop {sliding.margins()}" if sliding.poles.stable else "the loop is unstable while the axis slides"
+    )
+
+
+def loop_words(result: Recommendation, unit: Callable[[str], str]) -> str:
+    """Return the loop, its gains and its sample time in words."""
+    drive = result.drive
+    if drive.controller is not None:
+        kind = "own control laws"
+    elif isinstance(drive.gains, Cascade):
+        kind = "position P, velocity PI"
+    elif drive.gains is not None:
+        kind = "own gains"
+    else:
+        kind = f"{drive.linear} at {drive.bandwidth:g} Hz"
+    own = [f"velocity filter {drive.velocity_filter:g} Hz"] if drive.velocity_filter else []
+    return "; ".join(
+        [f"{kind} ({gain_words(result, unit)})", *own, f"sampled every {1e3 * drive.sample_time:g} ms"]
+    )
+
+
+def gain_words(result: Recommendation, unit: Callable[[str], str]) -> str:
+    """Return the gains of the linear controller with their units."""
+    units = {f.name: f.par.unit for kind in ("gains", "cascade") for f in control_law(kind).fields}
+    return ", ".join(
+        f"{k} {v:.5g} {unit(units[k]) if units.get(k, '-') != '-' else ''}".rstrip()
+        for k, v in result.gains.items()
+        if v
+    )
+
+
+def motion_words(result: Recommendation, unit: Callable[[str], str]) -> str:
+    """Return the motion's source, duration and highest speed, and how it starts and ends."""
     path, course = result.drive.path, result.drive.course
     speed = f", up to {path.top_speed:.3g} {unit('rad/s')}" if path.top_speed else ""
     said = [f"{path.source}; {path.duration:.3g} s{speed}"]
@@ -37,21 +180,32 @@ def recommendation_lines(result: Recommendation, unit: Callable[[str], str]) -> 
     if course.jumps:
         steps = f"{len(course.jumps)} steps of up to" if len(course.jumps) > 1 else "a step of"
         said.append(f"{steps} {course.highest_jump:.3g} {unit('rad')}")
-    out.append(f"motion:            {'; '.join([*said, *([course.said] if course.said else [])])}")
-    units = {f.name: f.par.unit for kind in ("gains", "cascade") for f in control_law(kind).fields}
-    gains = ", ".join(
-        f"{k} {v:.5g} {unit(units[k]) if units.get(k, '-') != '-' else ''}".rstrip()
-        for k, v in result.gains.items()
-        if v
-    )
-    out.append(f"linear controller: {gains}; RMS error alone {result.linear_error:.3g} {unit('rad')}")
-    if result.rings:
-        out.append(f"linear alone:      without a compensator it oscillates {result.rings}")
-        if result.chosen or result.instead:
-            out.append(
-                f"{'':19}below, safe means that the compensator adds no oscillation to this one; it does not end it"
-            )
-    return [*out, *beside_lines(result), *chosen_lines(result, unit), *result.notes]
+    return "; ".join([*said, *([course.said] if course.said else [])])
+
+
+def setting_rows(result: Recommendation, unit: Callable[[str], str]) -> Iterator[tuple[str, str, str]]:
+    """Yield name, value and unit of every number to set."""
+    chosen = result.switched_on
+    if result.instead is not None:
+        assert result.instead.controller is not None
+        yield "controller", result.instead.label, ""
+        for name, value in result.instead.controller.numbers().items():
+            yield name, f"{value:.6g}", ""
+        return
+    if chosen is None or result.model is None:
+        return
+    setting, model = chosen.setting, result.model
+    if setting.compensates:
+        yield "compensator", f"{setting.kind} of law {setting.law!r}", ""
+        yield "gain", f"{setting.gain:g}", ""
+        for f in model.law.fields:
+            value = getattr(model.parameters, f.name)
+            numbers = ", ".join(f"{v:.5g}" for v in value) if f.per_element else f"{value:.5g}"
+            yield f.name, numbers, "" if f.par.unit == "-" else unit(f.par.unit)
+        yield "lead", f"{setting.lead:.4g}", "s"
+        yield "dead band", f"{setting.deadband:.4g}", unit("rad/s")
+    yield "inertia times the reference's acceleration", f"{setting.inertia_feedforward:.5g}", unit("kg·m²")
+    yield "constant torque", f"{setting.offset:.5g}", unit("N·m")
 
 
 def chosen_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str]:
@@ -69,6 +223,8 @@ def chosen_lines(result: Recommendation, unit: Callable[[str], str]) -> list[str
         out.append(f"deadband:          {x.deadband:.4g} {unit('rad/s')}")
     fed = f"{x.inertia_feedforward:.4g} {unit('kg·m²')} times the acceleration"
     out.append(f"inertia:           {fed if x.inertia_feedforward else 'not fed forward'}")
+    said = [f"{error_from_to(*x.errors, unit('rad'))} ({x.axis})" for x in result.comparisons]
+    out.append(f"RMS error:         {'; '.join(said)}")
     out.append(f"error reduction:   {reduction(result)}")
     if x.compensates:
         out += [f"of this:           {said}" for said in without_friction(result)]
@@ -115,18 +271,23 @@ def taken_away(left: float) -> str:
 
 def beside_lines(result: Recommendation) -> list[str]:
     """Compensators of the catalogue: the error that each leaves, or why it is not switched on."""
-    if not result.beside:
-        return []
-    out = ["", f"{'compensator':<22}{'error left':>10}  {'worst':>7}  switched on"]
+    rows = list(beside_rows(result))
+    head = ["", f"{'compensator':<22}{'error left':>10}  {'worst':>7}  switched on"]
+    return (
+        [*head, *(f"{name:<22}{left:>10}  {worst:>7}  {why}" for name, left, worst, why in rows), ""]
+        if rows
+        else []
+    )
+
+
+def beside_rows(result: Recommendation) -> Iterator[tuple[str, str, str, str]]:
+    """Yield every compensator of the catalogue: name, error left, worst axis, and whether it is switched on or why
+    not."""
     for b in result.beside:
-        numbers = (
-            f"{100 * b.errors[0]:>8.1f} %  {100 * b.worst:>5.1f} %" if b.errors else f"{'–':>10}  {'–':>7}"
-        )
+        left, worst = (f"{100 * b.errors[0]:.1f} %", f"{100 * b.worst:.1f} %") if b.errors else ("–", "–")
         hardly = result.instead is None and result.chosen is not None and b.at_most <= result.chosen.worst
         why = b.why_not or ("it leaves hardly less" if hardly else "another one leaves less")
-        mark = "<- yes" if b is result.instead else f"no: {why}"
-        out.append(f"{b.label:<22}{numbers}  {mark}")
-    return [*out, ""]
+        yield b.label, left, worst, "<- yes" if b is result.instead else f"no: {why}"
 
 
 def instead_lines(result: Recommendation, taken: Beside) -> list[str]:

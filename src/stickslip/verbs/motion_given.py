@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,6 +17,7 @@ from stickslip.identify.doctor import timing, units
 from stickslip.identify.doctor.view import View
 from stickslip.identify.motion import REFERENCES, Motion, motion_of
 from stickslip.messages import name_option, render
+from stickslip.model import Reference
 from stickslip.readers import profiles, remembered
 from stickslip.readers.convert import Drive
 from stickslip.readers.derive import positioned
@@ -47,6 +49,12 @@ CODES = (
     "position-reference-unit",
     "reference-scale",
 )
+PERIODS = 2.0
+"""Of a reference that repeats, that are tried: the second is free of the start."""
+LAST_BREAK = 1e6
+"""s, until which a reference may come to rest."""
+SPACING, FEWEST_POINTS, MOST_POINTS = 1e-3, 200, 200_000
+"""s between the points of a reference, as samples of a usual drive; at least and at most so many points."""
 POINTS = 200
 """Rows of a table of points, from which on nobody has written them down so far apart that they are taken for ms."""
 
@@ -115,6 +123,30 @@ def motion_in(log: Log, given: Given = Given()) -> tuple[Motion, tuple[str, ...]
     return motion, tuple(
         render(f"{name_option('motion', name)}: {note.line()}.", motion=True) for note in notes
     )
+
+
+def motion_along(reference: Reference, duration: float | None) -> Motion:
+    """Return the points of a reference over `duration` seconds; None: two periods, or until it rests.
+
+    Raises
+    ------
+    InputError
+        If the duration is out of bounds, or none is given for a reference that neither repeats nor rests.
+    """
+    if duration is None:
+        frequency = float(getattr(reference.parameters, "frequency", 0.0))
+        ends = reference.breaks(LAST_BREAK) if frequency == 0.0 else []
+        duration = PERIODS / frequency if frequency > 0.0 else max(ends, default=0.0)
+        if not duration > 0.0:
+            raise InputError(
+                f"recommend: {reference!r} neither repeats nor comes to rest; give its duration in s"
+            )
+    if not 0.0 < duration < math.inf:
+        raise InputError(f"recommend: duration = {duration:g} s must be greater than 0 and finite")
+    count = min(max(round(duration / SPACING), FEWEST_POINTS), MOST_POINTS)
+    time = np.linspace(0.0, duration, count)
+    position, velocity, _ = reference.sample(time).T
+    return Motion(time, position, velocity, f"{reference!r}, {duration:.4g} s")
 
 
 def _opened(log: Log | Path, given: Given) -> Opened:

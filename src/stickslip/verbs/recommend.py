@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from stickslip.approval import allow_code
 from stickslip.arguments import arguments_checked
 from stickslip.control.controller import Controller
@@ -19,7 +21,9 @@ from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
+from stickslip.machines.rigid import RigidAxis
 from stickslip.messages import name_loop, name_option
+from stickslip.model import Model, Reference
 from stickslip.recommend import recommend as setting
 from stickslip.recommend.candidate_run import Drive
 from stickslip.recommend.resolution import encoder_for
@@ -27,7 +31,7 @@ from stickslip.recommend.sample_time import refuse_filter, sample_time_for
 from stickslip.verbs.candidates_given import Given, compensators_of, made_for
 from stickslip.verbs.compare import IdentifiedModel, identified_of
 from stickslip.verbs.motion_given import Given as MotionGiven
-from stickslip.verbs.motion_given import motion_in
+from stickslip.verbs.motion_given import motion_along, motion_in
 from stickslip.verbs.reading import Log
 from stickslip.verbs.recommendation import RecommendationResult
 
@@ -43,7 +47,7 @@ USUAL: Mapping[str, Any] = {
 
 @arguments_checked
 def recommend(
-    model: IdentifiedModel,
+    model: IdentifiedModel | Model | RigidAxis,
     *,
     bandwidth: float | None = 10.0,
     damping: float | None = 1.0,
@@ -56,7 +60,8 @@ def recommend(
     reference_velocity: ReferenceVelocity | None = None,
     counts_per_rev: float | None = None,
     torque_limit: float = math.inf,
-    motion: Log | None = None,
+    motion: Reference | Log | None = None,
+    duration: float | None = None,
     motion_map: Mapping[str, str] | Sequence[str] = (),
     remember: bool = False,
     amplitude: float | None = None,
@@ -77,8 +82,9 @@ def recommend(
 
     Parameters
     ----------
-    model : IdentificationResult or path
-        What `identify` gave, or the model.toml that it saved.
+    model : IdentificationResult, path, RigidAxis or Model
+        What `identify` gave, or the model.toml that it saved; or an axis of your own, or a friction law with `inertia`.
+        Such a law has no intervals: candidates then run on that one axis, and no interval of the reduction is given.
     bandwidth, damping : float, optional
         Of the position loop's poles, Hz and -; None: 10 Hz and 1. Refused beside `loop` and `controller`, which have
         their gains.
@@ -112,9 +118,11 @@ def recommend(
         0.5 µm.
     torque_limit : float
         N·m
-    motion : log, optional
-        Time and position of the motion that matters; that of the identification's log unless given. Tried from rest
-        to rest; one that never rests is begun and braked smoothly, which is not judged.
+    motion : log or Reference, optional
+        Time and position of the motion that matters, or a reference; that of the identification's log unless given.
+        Tried from rest to rest; one that never rests is begun and braked smoothly, which is not judged.
+    duration : float, optional
+        Of a reference, s; two periods, or until it rests, unless given.
     motion_map : mapping of str to str, or sequence of str
         Which of its columns is which channel, in which unit, as `map` of `identify`. Positions in counts are read by
         `counts_per_rev`.
@@ -151,22 +159,37 @@ def recommend(
     damping = float(USUAL["damping"]) if damping is None else damping
     refuse_numbers(axes, confirm)
     refuse_together(motion, amplitude, frequency)
-    if motion_map and motion is None:
+    if motion_map and (motion is None or isinstance(motion, Reference)):
         raise InputError(
             f"{name_option('motion_map')} says how the log of {name_option('motion')} is read; give that, too"
+        )
+    if duration is not None and not isinstance(motion, Reference):
+        raise InputError(
+            f"recommend: duration = {duration:g} s is that of a Reference; give one as motion, too"
         )
     if loop is not None:
         refuse_beside_loop(loop, linear=linear, bandwidth=bandwidth, damping=damping)
     gains, corner, limit, stated = own_loop(loop, torque_limit)
     tried = compensators_of(compensators)
-    found = identified_of(model)
+    found = identified_for(model, inertia)
     at_hand = load_machine(machine) if isinstance(machine, (str, os.PathLike)) else machine
     known_counts = (
         at_hand.encoder.counts if at_hand is not None and counts_per_rev is None else counts_per_rev
     )
+    if (
+        found.trajectory is None
+        and isinstance(model, (Model, RigidAxis))
+        and motion is None
+        and amplitude is None
+    ):
+        raise InputError(
+            'recommend: give the motion, such as motion=Reference("sine", amplitude=0.1, frequency=0.5)'
+        )
     hertz = 0.5 if frequency is None else frequency
     path, told = None, tuple[str, ...]()
-    if motion is not None:
+    if isinstance(motion, Reference):
+        path = motion_along(motion, duration)
+    elif motion is not None:
         path, told = motion_in(
             motion, MotionGiven(motion_map, known_counts or 0.0, remember, found.unit("rad"))
         )
@@ -212,6 +235,29 @@ def recommend(
             # A motion in a wrong unit is refused as one that no drive can follow.
             raise InputError("; ".join([str(error), *told])) from None
     return RecommendationResult(replace(result, notes=(*told, *result.notes)), found)
+
+
+def identified_for(given: IdentifiedModel | Model | RigidAxis, inertia: float | None) -> Identified:
+    """Return an identified model, or one without intervals from an axis or a friction law.
+
+    Raises
+    ------
+    InputError
+        As `identified_of`; if a law comes without an inertia, or an axis with a load or temperature of its own.
+    """
+    if isinstance(given, RigidAxis):
+        if (given.load, given.temperature) != (RigidAxis.load, RigidAxis.temperature):
+            raise InputError(
+                f"recommend: the axis has load = {given.load:g} and temperature = {given.temperature:g} °C; give an "
+                "axis whose friction holds at load 1 and 20 °C"
+            )
+        known = {"inertia": given.inertia}
+        return Identified(Path("the axis given"), given.friction, (), np.zeros((0, 0)), known)
+    if isinstance(given, Model):
+        if inertia is None:
+            raise InputError("recommend: a Model has no inertia; give inertia in kg·m², or a RigidAxis")
+        return Identified(Path("the model given"), given, (), np.zeros((0, 0)), {"inertia": inertia})
+    return identified_of(given)
 
 
 def refuse_numbers(axes: int, confirm: int) -> None:

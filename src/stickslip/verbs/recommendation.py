@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import Any
 
+from stickslip.analyse.controller_margins import ControllerStability, controller_stability
+from stickslip.analyse.machine_axis import axis_of
 from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError
 from stickslip.identify.identified_file import Identified
+from stickslip.identify.model_file import versions
 from stickslip.model import Model
+from stickslip.recommend.axes import plants_of
 from stickslip.recommend.file import setting_table, write_setting
 from stickslip.recommend.recommend import Candidate, Recommendation
 from stickslip.report.recommendation_text import (
@@ -21,10 +26,12 @@ from stickslip.report.recommendation_text import (
     recommendation_lines,
     reduction,
     safety,
+    summary_lines,
     without_friction,
     worst_left,
 )
 from stickslip.verbs import own_files
+from stickslip.verbs.identification import IdentificationResult
 from stickslip.whole_files import prepared_folder
 
 
@@ -32,6 +39,8 @@ from stickslip.whole_files import prepared_folder
 @dataclass(frozen=True, eq=False, repr=False)
 class RecommendationResult:
     """What to switch on, and what to expect; printed, it is what `stickslip recommend` prints.
+
+    `details` has all candidates and notes, `plot` the error before and after, `report` the page.
 
     Attributes
     ----------
@@ -106,6 +115,77 @@ class RecommendationResult:
         """What the user must know, one sentence each."""
         return self.recommendation.notes
 
+    @cached_property
+    def stability(self) -> ControllerStability | None:
+        """Poles and margins of the loop with what is recommended, about rest on the best estimate (`stability`).
+
+        None if a law of the loop is not smooth about rest.
+        """
+        drive = self.recommendation.drive
+        recommended = self.chosen is not None or self.recommendation.instead is not None
+        inertia = self.recommendation.inertia
+        plant = next(plants_of(self.identified, inertia, 0, 0, machine=drive.machine, delay=drive.delay))
+        try:
+            axis = axis_of(plant.built(drive.sample_time, drive.encoder_counts), 0.0)
+            return controller_stability(axis, self.controller if recommended else self.loop, drive.latest)
+        except InputError:
+            return None
+
+    @arguments_checked
+    def plot(self, found: IdentificationResult | None = None) -> Any:
+        """Draw the position error without and with what is recommended, on the best estimate and on the worst axis.
+
+        Parameters
+        ----------
+        found : IdentificationResult, optional
+            The identification: its measured torque and friction curve are drawn in place of the reference.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A notebook shows it; its ``savefig("advice.png")`` writes it.
+        """
+        from stickslip.report.plots import house_style
+        from stickslip.report.recommended import recommendation_figure
+
+        curve = next((p for p in found.pictures if p.name == "sliding-curve"), None) if found else None
+        with house_style():
+            return recommendation_figure(self.recommendation, self.identified.unit, curve)
+
+    @arguments_checked
+    def report(
+        self,
+        path: str | os.PathLike[str] = "recommendation.html",
+        setting_file: str | os.PathLike[str] = "recommended.toml",
+    ) -> Path:
+        """Write the report, one HTML file: verdict, error before and after, what to set, margins, limits.
+
+        Parameters
+        ----------
+        path : path
+        setting_file : path
+            The file that `save` writes, as the page's commands name it.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        from stickslip.report.recommended import write_recommendation
+
+        prepared_folder(Path(path).parent)
+        made = write_recommendation(
+            path, self.identified, self.recommendation, self.stability, notes=self.recommendation.notes,
+            setting_file=str(setting_file), versions=versions(),
+        )  # fmt: skip
+        own_files.written([made])
+        return made
+
+    @property
+    def details(self) -> str:
+        """All candidates, the parameters and all notes, as `stickslip recommend --all` prints them."""
+        return "\n".join(recommendation_lines(self.recommendation, self.identified.unit))
+
     @arguments_checked
     def save(self, path: str | os.PathLike[str] = "recommended.toml") -> Path:
         """Write the law and the setting, as `export` and `stickslip rig run track` take them.
@@ -134,7 +214,7 @@ class RecommendationResult:
         return self.recommendation.as_dict()
 
     def __str__(self) -> str:
-        return "\n".join(recommendation_lines(self.recommendation, self.identified.unit))
+        return "\n".join(summary_lines(self.recommendation, self.identified, self.stability))
 
     def __repr__(self) -> str:
         if self.recommendation.instead is not None:

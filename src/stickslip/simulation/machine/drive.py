@@ -27,11 +27,15 @@ from stickslip.simulation.fixed.loop import NUDGE
 from stickslip.simulation.machine.plant import CHANNELS, SHOWN, Laid, Plant, plant_of
 from stickslip.simulation.machine.step import ITSELF, axis_itself, measure, sample
 
+OF_DRIVETRAINS = ("motor_position", "load_position")
+"""Channels of a machine with springs: its first and its last inertia."""
 UNITS = {
     **OF_AXES_UNITS, "position_measured": "rad", "torque_command": "N·m", "sensor_torque": "N·m", "temperature": "°C",
+    **dict.fromkeys(OF_DRIVETRAINS, "rad"),
 }  # fmt: skip
 COLUMNS = (*OF_AXES, *(name for name in UNITS if name not in OF_AXES))
-"""Of a row: what an ideal axis has (position and torques are the axis's own), then what the sensors show."""
+"""Of a row: what an ideal axis has (position and torques are the axis's own), then what the sensors show, then
+`OF_DRIVETRAINS`."""
 ROW = np.dtype([(name, np.float64) for name in COLUMNS])
 """A row of the record."""
 END = np.dtype([(name, np.float64) for name in (*ITSELF, "motor", "compensating")])
@@ -139,6 +143,8 @@ def drive(loop: Loop, samples: int, output: Output) -> int:
         if counts[1] < places.size and places[counts[1]] == k:
             row = record_at(pointer(output.rows[counts[1]], 0), ROW)
             write(row, asked.motion, begin, shown, torque)
+            axis, n = plant.axis, plant.machine
+            row.motor_position, row.load_position = axis[n.rotor], axis[n.disk]
             counts[1] += 1
         if not math.isfinite(torque):
             return NO_NUMBER

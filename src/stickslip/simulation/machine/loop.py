@@ -29,7 +29,16 @@ from stickslip.simulation._nodes import SIGNALS
 from stickslip.simulation.case_arrays import DIVERGED, ruled, ruled_in, slip_rules
 from stickslip.simulation.compiled_controller import Sampled, compiled
 from stickslip.simulation.integrators import REASONS, calmed
-from stickslip.simulation.machine.drive import COLUMNS, NO_NUMBER, TRIPPED, UNITS, Loop, Output, drive
+from stickslip.simulation.machine.drive import (
+    COLUMNS,
+    NO_NUMBER,
+    OF_DRIVETRAINS,
+    TRIPPED,
+    UNITS,
+    Loop,
+    Output,
+    drive,
+)
 from stickslip.simulation.machine.layout import TOLERANCE, lay_out_machine, stand_at
 from stickslip.simulation.machine.plant import FINEST
 from stickslip.simulation.metrics import metrics, settle_band_of
@@ -87,9 +96,10 @@ def simulate_machine(
     Returns
     -------
     Record
-        ``meta["machine"]`` says which machine ran, and what was switched off; ``meta["learned"]`` what the controller
-        has learned (`stickslip.control.learned`); ``meta["general_step"]`` why it moved by sub-steps and along no
-        located flow (decision 0033), where it did; there is no energy balance.
+        Of a machine with springs, ``motor_position`` and ``load_position`` are its first and last inertia's, and
+        ``position`` that at the encoder. ``meta["machine"]`` says which machine ran, and what was switched off;
+        ``meta["learned"]`` what the controller has learned (`stickslip.control.learned`); ``meta["general_step"]`` why
+        it moved by sub-steps and along no located flow (decision 0033), where it did; there is no energy balance.
     """
     own = machine
     if slip_rule is not None:
@@ -120,8 +130,9 @@ def simulate_machine(
         meta["learned"] = learned
     meta |= _results(runs, local, metered)
     columns = np.ascontiguousarray(runs[0].rows.T)
-    channels = {name: columns[i] for i, name in enumerate(COLUMNS) if name != "time"}
-    record = Record(columns[0], channels, UNITS, meta)
+    left_out = ("time", *(() if machine.flexible else OF_DRIVETRAINS))
+    channels = {name: columns[i] for i, name in enumerate(COLUMNS) if name not in left_out}
+    record = Record(columns[0], channels, {name: UNITS[name] for name in channels}, meta)
     if runs[0].code:
         ended = runs[0].ended
         raise Divergence(
