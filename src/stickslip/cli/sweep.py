@@ -3,8 +3,8 @@
     stickslip sweep thesis-robustness      included: friction and inertia up to 30 % off, for every compensator
     stickslip sweep my.toml                your own; start from a copy (`stickslip sweep thesis-robustness --print`)
 
-Writes DIR/data/ (a Parquet data set), manifest.json, summary.csv and figures. Finished blocks are kept: after any
-interruption the same command resumes.
+Writes DIR/data/ (.npz files), manifest.json, summary.csv and figures, and with the extra `parquet` all cases in
+cases.parquet. Finished blocks are kept: after any interruption the same command resumes.
 """
 
 from __future__ import annotations

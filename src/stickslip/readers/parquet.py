@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.extras import needed
 from stickslip.finding import Finding
 from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Array, Column, Format, Table
@@ -25,9 +26,8 @@ def recognise(head: bytes, path: Path) -> bool:
 
 def read(path: Path) -> Table:
     """Every column of numbers, truth values, times or lists of numbers; nulls become NaN."""
+    parquet, pa = (needed(module, "parquet", "Parquet files need") for module in ("pyarrow.parquet", "pyarrow"))
     try:
-        parquet: Any = importlib.import_module("pyarrow.parquet")
-        pa: Any = importlib.import_module("pyarrow")
         with parquet.ParquetFile(path) as file:
             return _read(pa, file, path)
     except InputError:
