@@ -30,8 +30,8 @@ KINDS = ("study", "sweep", "tune")
 MARK = ".stickslip-results"
 """File that says whose results a folder holds, from before the first of them"""
 PLACES = (
-    "manifest.json", "metrics.csv", "metrics.parquet", "summary.csv", "cases.parquet", "report.html", "results.jsonl", "*-tuned.json",
-    "*-tried.csv", "inputs", "figures", "records", "data", "variants",
+    "manifest.json", "metrics.csv", "metrics.parquet", "summary.csv", "cases.parquet", "report.html", "results.jsonl",
+    "*-tuned.json", "*-tried.csv", "inputs", "figures", "records", "data", "variants",
 )  # fmt: skip
 """Patterns of the names of results: what is there and is not ours is not overwritten"""
 

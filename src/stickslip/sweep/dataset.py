@@ -1,8 +1,9 @@
 """Read and write the data set of a sweep: one `.npz` file per block, in folders named after the parts of the run.
 
-``DIR/data/slip_rule=signed/reference=low/friction=nominal/controller=PD/part-000000.npz`` has one array per column. A file
-is written as a draft and then renamed, and contains the fingerprint of its numbers. An interrupted sweep therefore finds
-all finished blocks. Where pyarrow is installed, a finished sweep also has all cases in one table, ``cases.parquet``.
+``DIR/data/slip_rule=signed/reference=low/friction=nominal/controller=PD/part-000000.npz`` has one array per column. A
+file is written as a draft and then renamed, and contains the fingerprint of its numbers. An interrupted sweep therefore
+finds all finished blocks. Where pyarrow is installed, a finished sweep also has all cases in one table,
+``cases.parquet``.
 """
 
 from __future__ import annotations
