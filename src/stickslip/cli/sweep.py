@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from stickslip.sweep.plan import Sweep
 
 MANY = 1000
-"""Closed loops from which it is told beforehand how long they take."""
+"""Number of closed loops above which the duration is estimated in advance."""
 SUMMARY = "run a study over many cases, such as uncertain parameters"
 
 
@@ -43,7 +43,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def announced(sweep: Sweep, jobs: int) -> Sweep:
-    """Say before a long sweep starts how long it will take, from a few of its cases; blocks are sized so."""
+    """Print the estimated duration of a long sweep from a few of its cases; these also determine the size of blocks."""
     from stickslip.cli import _output
     from stickslip.sweep.forecast import block_size, paces_of, seconds_of
 
