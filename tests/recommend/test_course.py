@@ -83,10 +83,7 @@ def test_a_part_of_a_log_that_is_cut_in_mid_move_is_tried_from_rest_to_rest(
     first, last = course.judged.time[[0, -1]]
     assert (first, last) == pytest.approx(kept, abs=0.02)
     assert (course.run_up, course.braking, course.said) == (0.0, 0.0, "")
-    assert (
-        f"; from {first - begin:.3g} to {last - begin:.3g} s, rest to rest"
-        in course.judged.source
-    )
+    assert f"; from {first - begin:.3g} to {last - begin:.3g} s, rest to rest" in course.judged.source
     assert alone(moves(begin, end)) == pytest.approx(alone(moves(0.0, 7.2)), rel=0.2)
 
 

@@ -324,7 +324,9 @@ def test_every_rigid_contact_of_a_prompt_drive_rings_about_a_coarse_count_and_no
     rigid = [p.friction.law.name == "stribeck" and p.delay < 0.2 for p in plants]
     assert [any(p is r for r in rung) for p in plants] == rigid
     said = rings_alone(bench, INERTIA, "N·m")
-    assert said.startswith(f"at rest on {ringing} of 7 axes: one encoder count causes a torque pulse of 0.15 N·m")
+    assert said.startswith(
+        f"at rest on {ringing} of 7 axes: one encoder count causes a torque pulse of 0.15 N·m"
+    )
 
 
 @pytest.mark.parametrize(

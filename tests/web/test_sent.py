@@ -123,7 +123,8 @@ def test_code_that_cannot_be_shown_is_refused(served: Served) -> None:
         ([("a.toml", MODEL), ("about.json", "{}")], "plain names"), ([("a.toml", "x = [")], "is not TOML"),
         ([("a.toml", MODEL), ("b.toml", MODEL)], "one model or study at a time"), ([("sent.py", "")], "one model"),
         ([("a.toml", '[rig]\nkind = "sent.py"\n')], "was not uploaded"), ([("a.toml", "x = 1")], "unknown kind"),
-        ([("a.toml", MODEL), ("model.toml", 'x = "a.toml"')], "one model or study|is of an unknown kind"), ([], "at most 20"),
+        ([("a.toml", MODEL), ("model.toml", 'x = "a.toml"')], "one model or study|is of an unknown kind"),
+        ([], "at most 20"),
     ],
 )  # fmt: skip
 def test_files_that_are_none_are_told_so(served: Served, files: list[tuple[str, str]], said: str) -> None:

@@ -87,12 +87,13 @@ def keep_block(folder: Path, sweep: Sweep, block: Block) -> None:
     columns["failure"] = np.array(block.failures, dtype=np.str_)
     columns["integrator"] = np.array(block.integrators, dtype=np.str_)
     about = {"fingerprint": sweep.fingerprint(block.run), "size": sweep.size_of(block.run)}
+    columns[ABOUT] = np.array(json.dumps(about))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise unwritable(path, error) from None
     with draft_of(path) as draft, draft.open("wb") as file:
-        np.savez_compressed(file, **columns, **{ABOUT: np.array(json.dumps(about))})
+        np.savez_compressed(file, **columns)
 
 
 def write_cases(folder: Path, sweep: Sweep) -> bool:
