@@ -16,7 +16,7 @@ The tree of exceptions::
     │   ├── MeasurementFault          readings or clock of the rig freeze, jump or contradict the torque
     │   ├── Overrun                   a controller in Python took more than its time
     │   ├── RecordFault               the record could not be written: a full disk
-    │   └── Interrupted               a signal asked for the end
+    │   └── Interrupted               a signal requested the end
     └── SimulationError               a run ended early: when, why, and the record of what was computed
         ├── Divergence                position or velocity left every reasonable bound, or is not a number
         ├── EventStorm                more switches than the limit in a short time
@@ -185,7 +185,7 @@ class RecordFault(RigError):
 
 
 class Interrupted(RigError):
-    """A signal asked for the end."""
+    """A signal requested the end of the run."""
 
 
 class SimulationError(StickslipError):

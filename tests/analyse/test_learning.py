@@ -100,5 +100,5 @@ def test_over_the_angle_faster_motion_and_finer_bins_ask_for_more():
 def test_what_cannot_be_judged_is_refused():
     with pytest.raises(InputError, match=r"rate = 2 converges with no filter"):
         widest(AXIS, ROWS["PD"], 2.0)
-    with pytest.raises(InputError, match="not stable while the axis slides"):
+    with pytest.raises(InputError, match="unstable while the axis slides"):
         widest(Axis(Drivetrain((0.02 * INERTIA,)), AXIS.friction), ROWS["PD"], 0.8)

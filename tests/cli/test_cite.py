@@ -88,7 +88,7 @@ def test_files_records_and_studies(tmp_path: Path, monkeypatch, capsys) -> None:
 @pytest.mark.parametrize(
     ("thing", "said"),
     [
-        ("lugree", "is no law"),
+        ("lugree", "is not a law"),
         ("none.toml", "cannot read"),
         ("none.npz", "no record at"),
         (".", "no manifest"),

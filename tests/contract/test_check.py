@@ -93,7 +93,7 @@ def test_a_right_law_with_a_source_of_its_own_and_a_level_of_products_passes(
     assert "no parameter in N·m gives a level" in said["bounded"]
     assert said["export python"].startswith("ok")
     assert said["export urdf"].startswith("-       export urdf        urdf carries Coulomb")
-    assert lines[-1] == "dahl-example: passes what could be tried"
+    assert lines[-1] == "dahl-example: passed all available checks"
 
 
 def test_the_command_ends_with_1_where_a_check_fails(law_of, tmp_path, capsys, monkeypatch):

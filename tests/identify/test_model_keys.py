@@ -61,7 +61,7 @@ def test_the_printed_model_file_is_a_model(joint: Path, capsys: pytest.CaptureFi
     plain = capsys.readouterr().out
     assert "with symmetry = asymmetric:\n  fc_negative" in plain
     assert main(["law", "coulomb", "--set", "symmetry=asymmetric", "--set", "fc_negative=0.2"]) == 0
-    printed = capsys.readouterr().out.partition("as a model's file has it (model.toml):\n")[2]
+    printed = capsys.readouterr().out.partition("in the file of a model (model.toml):\n")[2]
     joint.write_text(printed)
     found = ss.Model.from_file(joint)
     assert found.sliding_torque([1.0, -1.0]).tolist() == pytest.approx([0.303, -0.218])

@@ -81,6 +81,7 @@ def test_ros_bag(tmp_path, storage):
         (b"MDF     4.10", "asammdf", "mdf"),
         (b"TDSm", "nptdms", "tdms"),
         (b"#ROSBAG V2.0\n", "rosbags", "rosbag"),
+        (b"PAR1", "pyarrow", "parquet"),
     ],
 )
 def test_what_is_missing_is_named(tmp_path, monkeypatch, head, module, extra):

@@ -290,7 +290,7 @@ def test_the_linear_controller_alone_is_judged_first_and_its_ringing_is_no_feedf
     drive = Drive(20.0, amplitude=0.1, encoder_counts=4096.0, torque_limit=3.0)
     few, many = (recommend(identified(0.03), drive, axes=n, confirm=6) for n in (0, 3))
     assert many.rings == few.rings
-    assert "at rest on 1 of 7 axes: a count of the encoder makes it push 0.15 N·m" in many.rings
+    assert "at rest on 1 of 7 axes: one encoder count causes a torque pulse of 0.15 N·m" in many.rings
     assert "lower the bandwidth" in many.rings
     assert many.chosen
     said = "\n".join(recommendation_lines(many, str))
@@ -324,7 +324,9 @@ def test_every_rigid_contact_of_a_prompt_drive_rings_about_a_coarse_count_and_no
     rigid = [p.friction.law.name == "stribeck" and p.delay < 0.2 for p in plants]
     assert [any(p is r for r in rung) for p in plants] == rigid
     said = rings_alone(bench, INERTIA, "N·m")
-    assert said.startswith(f"at rest on {ringing} of 7 axes: a count of the encoder makes it push 0.15 N·m")
+    assert said.startswith(
+        f"at rest on {ringing} of 7 axes: one encoder count causes a torque pulse of 0.15 N·m"
+    )
 
 
 @pytest.mark.parametrize(

@@ -206,7 +206,7 @@ def test_of_a_loop_that_nobody_runs_yet_no_axis_is_left_out() -> None:
 
 @pytest.mark.parametrize(
     ("bandwidth", "limit", "why"),
-    [(28.0, 3.0, r"RMS error \S+ rad along a motion of"), (60.0, math.inf, "position or velocity left")],
+    [(28.0, 3.0, r"RMS error \S+ rad along a motion of"), (60.0, math.inf, "position or velocity exceeded")],
 )
 def test_a_loop_that_is_unstable_on_the_identified_axis_is_refused_before_a_compensator_is_blamed(
     bandwidth: float, limit: float, why: str
@@ -310,5 +310,5 @@ def test_a_loop_is_lost_where_it_swings_or_misses_far_more_than_on_the_best_esti
     )
     assert lost(light, alone, drive)
     assert not lost(heavy, alone, drive)
-    assert lost("position or velocity left every reasonable bound", alone, drive)
+    assert lost("position or velocity exceeded all reasonable limits", alone, drive)
     assert not lost("diverged", "diverged", drive)

@@ -75,7 +75,7 @@ def test_what_is_not_switched_on_is_told_why(tmp_path):
         assert why[name] == CATALOGUE[name].against != ""
     assert why["ff-gms"].startswith("no GMS law is known")
     by_label = {b.label: b for b in advice.beside}
-    assert by_label["PD + makkar"].why_not == "it adapts, and nothing under it moves an axis that sticks"
+    assert by_label["PD + makkar"].why_not == "it adapts, and nothing else in it moves a sticking axis"
     scale = by_label["PD + scale-dob"].learned["feedforward_scale"]
     assert abs(scale["value"] - 1.0) <= 5.0 * scale["uncertainty"] < 0.2
     assert by_label["PD + dob"].learned == {}
@@ -113,7 +113,7 @@ def test_of_those_as_good_what_adapts_nothing_is_switched_on(monkeypatch, plain,
         (errors[tried[0].name], 1.5 * errors[tried[0].name])
     )
     (scale,) = (b for b in tried if b.name == "scale")
-    assert scale.why_not == ("" if scale.label == taken else "it adapts, and PD + ff-lugre is as good")
+    assert scale.why_not == ("" if scale.label == taken else "it adapts, and PD + ff-lugre is equally good")
 
 
 @pytest.mark.usefixtures("few")
@@ -164,7 +164,7 @@ def test_what_is_wrong_is_said_in_a_line():
         with pytest.raises(ParameterError, match="must be greater than 0 and finite"):
             made()
     loop = compensated("dob", "PD", belief_of(known(**THESIS).model, Drive(amplitude=0.1), 4e-4))
-    with pytest.raises(ParameterError, match="bring their own loop; leave controller out"):
+    with pytest.raises(ParameterError, match="have their own loop; leave controller out"):
         belief_of(known(**THESIS).model, Drive(amplitude=0.1, controller=loop), 4e-4)
 
 

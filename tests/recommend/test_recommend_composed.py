@@ -124,7 +124,7 @@ def test_the_tables_of_a_controller_are_that_controller(tmp_path):
         (Controller(loop=LOOP, sample_time=2e-3), "sample_time = 0.001 s, the controller's is 0.002 s"),
         (
             Controller(loop=LOOP, sample_time=T, feedforward=ControlBlock("friction_feedforward", LAW)),
-            "'friction_feedforward' holds a friction law",
+            "'friction_feedforward' contains a friction law",
         ),
     ],
 )

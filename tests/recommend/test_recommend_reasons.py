@@ -119,7 +119,7 @@ def test_a_swing_wider_than_counts_is_the_integrals_and_no_finer_encoder_is_aske
     assert f"by up to {swing:.2g} rad peak to peak" in said
     assert ("the integral part hunts" in said) is own
     assert ("lower ki (8)" in said) is own
-    assert ("take a finer encoder" in said) is not own
+    assert ("use a finer encoder" in said) is not own
 
 
 def test_what_stays_within_the_counts_by_a_small_torque_is_no_oscillation() -> None:

@@ -317,7 +317,7 @@ def test_a_conclusion_says_by_how_much() -> None:
         [{"count": 3, "words": "statements hold"}], {"a": (2, 2), "b": (1, 3)}, [(2.0, 1.0)]
     )
     assert lines[0] == "Of the thesis's statements 3 hold."
-    assert "hold wherever they were tried: a." in lines[1]
+    assert "hold wherever they were tested: a." in lines[1]
     assert "do not hold everywhere: b (1 of 3 parts)." in lines[2]
     assert "2 times the compensator's" in lines[3]
 

@@ -80,7 +80,7 @@ def test_a_mode_that_the_drive_leaves_by_itself(drive, monkeypatch):  # noqa: F8
     """Nobody is seen to write it: an input or another interface of the drive."""
     monkeypatch.setattr(cia402, "interference", lambda *_: "")
     rig = Disturbed(drive.settings(), [(0x600 + NODE, SET_MODE, False)])
-    with pytest.raises(DriveFault, match="mode of operation is 1 in place of 10"), Loop(rig) as loop:
+    with pytest.raises(DriveFault, match="mode of operation is 1 instead of 10"), Loop(rig) as loop:
         loop.run(setpoints(3000, torque=0.2))
     assert rig.torques[-1] == 0.0
     drive.tell((0x6060, 0, "<b", 10))

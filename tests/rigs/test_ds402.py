@@ -154,7 +154,7 @@ def test_a_fault_is_reset_on_request_only(drive):
         loop.run(setpoints(200, torque=0.2))
     drive.fault(0)
     with (
-        pytest.raises(DriveFault, match="shows fault 0x3210"),
+        pytest.raises(DriveFault, match="has fault 0x3210"),
         Loop(Ds402(drive.settings(reset_fault=False))),
     ):
         pass

@@ -193,7 +193,7 @@ def test_a_signal_between_two_runs_is_not_lost(tmp_path):
     with pytest.raises(Interrupted, match="SIGTERM"), Loop(rig, path=tmp_path / "run.stream") as loop:
         work(loop)
     assert rig.torques[-1] == 0.0
-    assert Record.load(tmp_path / "run.stream").meta["ended"] == "SIGTERM asked for the end"
+    assert Record.load(tmp_path / "run.stream").meta["ended"] == "SIGTERM requested the end"
 
 
 @pytest.mark.flaky(reruns=2)  # measures the loop's own time

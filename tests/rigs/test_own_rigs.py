@@ -137,7 +137,7 @@ def test_a_file_of_a_rig(before, build, rig, said, tmp_path, capsys):
         ("presliding", "frequency=1e-9", "days"),
         ("presliding", "frequency=0", "frequency = 0"),
         ("presliding", "frequency=1e-300", "days"),
-        ("presliding", "cycles=1e-9", "not one row"),
+        ("presliding", "cycles=1e-9", "no row was recorded"),
         ("breakaway", "rate=1e-9", "days"),
         ("breakaway", "rate=1e-320", "days"),
         ("breakaway", "interval=1e-9", "days"),
@@ -148,7 +148,7 @@ def test_a_file_of_a_rig(before, build, rig, said, tmp_path, capsys):
         ("inertia", "duration=1e9", "days"),
         ("track", "duration=1e9", "memory"),
         ("repeat", "interval=1e300", "days"),
-        ("stickslip", "average=" + 26 * "9", "not one row"),
+        ("stickslip", "average=" + 26 * "9", "no row was recorded"),
     ],
 )
 def test_a_size_beyond_memory_or_patience_is_told_before(name, option, said, tmp_path, capsys):

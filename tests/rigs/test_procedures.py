@@ -132,7 +132,7 @@ def test_a_plan_beyond_the_limits_is_refused_before_anything_moves():
     ("name", "options", "says"),
     [
         ("sliding", {"velocitys": "1"}, "did you mean 'velocities'"),
-        ("sliding", {"velocities": "a"}, "numbers with commas"),
+        ("sliding", {"velocities": "a"}, "numbers separated by commas"),
         ("track", {"model": "gsm"}, "give a model.toml or one of"),
         ("track", {"compensator": "both"}, "compensator 'both'"),
         ("track", {"reference": "slow"}, "reference 'slow'"),

@@ -157,7 +157,7 @@ def test_every_signal_that_would_end_or_halt_the_process_ends_the_run():
         process.send_signal(number)
         said = process.stdout.readline()
         assert said.startswith("0.0 1 SIG"), number
-        assert said.endswith("asked for the end\n")
+        assert said.endswith("requested the end\n")
     assert process.wait(timeout=60) == 0
 
 

@@ -80,7 +80,7 @@ def test_a_run_is_the_same_twice_and_feels_its_seed():
 
 def test_an_interrupted_run_is_no_result(chapter_4, monkeypatch):
     def asked(self, plant):
-        raise Interrupted("SIGINT asked for the end")
+        raise Interrupted("SIGINT requested the end")
 
     monkeypatch.setattr(ExperimentRun, "measured", asked)
     with pytest.raises(Interrupted):

@@ -2,13 +2,17 @@
 
 from pathlib import Path
 
-import pyarrow.dataset
+import numpy as np
+import pandas as pd
 
 SMALL = Path(__file__).parents[1] / "sweep" / "small.toml"
 
 
 def table(folder):
-    found = pyarrow.dataset.dataset(
-        folder / "data", partitioning="hive", exclude_invalid_files=True
-    ).to_table()
-    return found.sort_by([("controller", "ascending"), ("case", "ascending")])
+    """All cases as a data frame, by controller and number."""
+    parts = []
+    for path in sorted((folder / "data").rglob("part-*.npz")):
+        with np.load(path) as data:
+            columns = {name: data[name] for name in data.files if name != "__about__"}
+        parts.append(pd.DataFrame({"controller": path.parent.name.partition("=")[2], **columns}))
+    return pd.concat(parts, ignore_index=True)

@@ -62,7 +62,7 @@ def test_a_part_is_chosen_by_dragging(log: Any) -> None:
     rows = int(re.search(r"(\d+) rows", log.locator(".facts").inner_text())[1])
     assert rows == pytest.approx(3000, abs=60)
     assert "is used" in log.locator(".cut").inner_text()
-    log.get_by_role("button", name="Use all of it again").click()
+    log.get_by_role("button", name="Use the whole log again").click()
     log.locator(".facts").filter(has_text="6000 rows").wait_for()
 
 
@@ -154,7 +154,7 @@ def test_a_compressed_log_is_unpacked(page: Any, tmp_path: Path) -> None:
     (tmp_path / "demo.csv.gz").write_bytes(gzip.compress(DEMO.read_bytes()))
     (tmp_path / "broken.csv.gz").write_bytes(b"no gzip")
     drop(page, tmp_path / "broken.csv.gz")
-    page.get_by_text("broken.csv.gz ends in .gz, but it cannot be unpacked").wait_for()
+    page.get_by_text("broken.csv.gz ends in .gz but cannot be unpacked").wait_for()
     drop(page, tmp_path / "demo.csv.gz")
     page.wait_for_selector(f"{WHOLE} canvas")
     assert page.locator("h1").inner_text() == "demo.csv"
@@ -163,7 +163,7 @@ def test_a_compressed_log_is_unpacked(page: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "said"),
     [("run.xlsx", "a spreadsheet: save its sheet as CSV"), ("runs.zip", "an archive: unpack it"),
-     ("plot.png", "no log"), ("law.py", "drop both together")],
+     ("plot.png", "not a log"), ("law.py", "drop both together")],
 )  # fmt: skip
 def test_what_is_no_log_is_told_so(page: Any, tmp_path: Path, name: str, said: str) -> None:
     """With what to do instead, before it is sent."""
@@ -185,7 +185,7 @@ def test_two_models_are_compared(page: Any, served: Served) -> None:
     # Whoever comes before the second is identified finds it here when it is.
     page.evaluate("(a) => { location.hash = a; }", f"#/p/{project}/compare")
     page.get_by_role("button", name="Compare").click()
-    page.get_by_role("heading", name="No change is shown").wait_for()
+    page.get_by_role("heading", name="No significant change").wait_for()
     page.wait_for_selector(".plot canvas")
     legend = page.locator(".plot .legend li").all_inner_texts()
     assert len(set(legend)) == len(legend) >= 2
@@ -194,7 +194,7 @@ def test_two_models_are_compared(page: Any, served: Served) -> None:
     assert head == ["quantity", "before", "after", "unit", "change", "verdict"]
     inertia = page.locator("tr", has_text="inertia").first.locator("td").all_inner_texts()
     assert inertia[0] == inertia[1]
-    assert inertia[2:] == ["kg·m²", "0.0 %", "not shown to have changed"]
+    assert inertia[2:] == ["kg·m²", "0.0 %", "no significant change"]
 
 
 def test_a_long_log_is_seen_before_the_doctor_has_done(page: Any, served: Served, tmp_path: Path) -> None:
@@ -213,7 +213,7 @@ def test_a_long_log_is_seen_before_the_doctor_has_done(page: Any, served: Served
     assert client.post(f"{base}/models", json={"logs": [log["id"]]}).status_code == 409
     page.evaluate("(a) => { location.hash = a; }", f"#/p/{base.rpartition('/')[2]}/log/{log['id']}")
     page.wait_for_selector(".signals .canvas[data-drawn='500000'] canvas")
-    page.get_by_text("The doctor looks at it").wait_for()
+    page.get_by_text("The doctor is checking this log").wait_for()
     page.locator(".signals .canvas").first.focus()
     whole = seen(page)
     page.keyboard.press("+")

@@ -219,14 +219,14 @@ def test_one_real_machine_moves_at_a_time(served: Served, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("files", "said"),
     [
-        ({"rig_toml": VIRTUAL}, "'servo.toml', which did not come with it"),
-        ({"rig_toml": OWN}, "'pendulum.py', which did not come with it"),
-        ({"rig_toml": '[rig]\nkind = "replay"\nfile = "run.npz"\n'}, "'run.npz', which did not come with it"),
+        ({"rig_toml": VIRTUAL}, "'servo.toml', which was not uploaded; drop both"),
+        ({"rig_toml": OWN}, "'pendulum.py', which was not uploaded; drop both"),
+        ({"rig_toml": '[rig]\nkind = "replay"\nfile = "run.npz"\n'}, "'run.npz', which was not uploaded; drop both"),
         ({"rig_toml": VIRTUAL.replace("servo", "x/servo"), "servo_toml": SERVO}, "name it without a folder"),
-        ({"rig_toml": VIRTUAL.replace("servo", "../servo"), "servo_toml": SERVO}, "outside what was sent"),
-        ({"rig_toml": '[rig]\nkind = "replay"\nfile = "/dev/zero"\n'}, "outside what was sent"),
-        ({"rig_toml": SOCKETCAN.replace("can0", "/dev/../etc/passwd")}, "outside what was sent"),
-        ({"servo_toml": SERVO.replace('"gms"', '"own.py"')}, "'own.py', which did not come with it"),
+        ({"rig_toml": VIRTUAL.replace("servo", "../servo"), "servo_toml": SERVO}, "which was not uploaded; put"),
+        ({"rig_toml": '[rig]\nkind = "replay"\nfile = "/dev/zero"\n'}, "which was not uploaded; put"),
+        ({"rig_toml": SOCKETCAN.replace("can0", "/dev/../etc/passwd")}, "which was not uploaded; put"),
+        ({"servo_toml": SERVO.replace('"gms"', '"own.py"')}, "'own.py', which was not uploaded; drop both"),
         ({"rig_toml": SERVO}, "a machine cannot be called rig.toml"),
     ],
 )  # fmt: skip
@@ -284,7 +284,7 @@ def test_a_record_that_is_played_back_says_that_nothing_moves(served: Served) ->
         client, project, rig_toml=text, run_csv=f"time (s),position (rad),motor torque (Nm)\n{rows}"
     )
     assert about["state"] == "ready", about["problem"]
-    assert about["sentence"].startswith("This plays a record back")
+    assert about["sentence"].startswith("This replays a record")
     asked = {"rig": about["id"], "procedure": "presliding", "armed": True}
     assert client.post(f"/api/projects/{project}/rig/run", json=asked).status_code == 409
 

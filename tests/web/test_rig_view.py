@@ -92,8 +92,8 @@ def moving_while_alive(client: Any, project: str, made: dict[str, str], stream: 
 
 def begin(page: Any) -> None:
     """As a person begins a run: plan, arm, start."""
-    page.get_by_label("A new project, named").fill("rig")
-    page.get_by_role("button", name="Make").click()
+    page.get_by_label("New project name").fill("rig")
+    page.get_by_role("button", name="Create").click()
     page.get_by_role("link", name="Rig", exact=True).click()
     page.get_by_label("Rig", exact=True).select_option("thesis-dry")
     page.locator("summary", has_text="Options of the procedure").click()

@@ -115,15 +115,16 @@ def test_code_that_cannot_be_shown_is_refused(served: Served) -> None:
 @pytest.mark.parametrize(
     ("files", "said"),
     [
-        ([("a.toml", MODEL.replace("sent.py", "../../sent.py"))], "outside what was sent"),
-        ([("a.toml", MODEL.replace("sent.py", "/tmp/sent.py"))], "outside what was sent"),
-        ([("a.toml", MODEL.replace("sent.py", "~/sent.py"))], "outside what was sent"),
-        ([("a.toml", MODEL.replace('"sent.py"', r"'C:\\sent.py'"))], "outside what was sent"),
+        ([("a.toml", MODEL.replace("sent.py", "../../sent.py"))], "which was not uploaded; put"),
+        ([("a.toml", MODEL.replace("sent.py", "/tmp/sent.py"))], "which was not uploaded; put"),
+        ([("a.toml", MODEL.replace("sent.py", "~/sent.py"))], "which was not uploaded; put"),
+        ([("a.toml", MODEL.replace('"sent.py"', r"'C:\\sent.py'"))], "which was not uploaded; put"),
         ([("../a.toml", MODEL)], "plain names"), ([("a.toml", MODEL), ("b/sent.py", "")], "plain names"),
-        ([("a.toml", MODEL), ("about.json", "{}")], "plain names"), ([("a.toml", "x = [")], "is no TOML"),
+        ([("a.toml", MODEL), ("about.json", "{}")], "plain names"), ([("a.toml", "x = [")], "is not TOML"),
         ([("a.toml", MODEL), ("b.toml", MODEL)], "one model or study at a time"), ([("sent.py", "")], "one model"),
-        ([("a.toml", '[rig]\nkind = "sent.py"\n')], "did not come with it"), ([("a.toml", "x = 1")], "not known"),
-        ([("a.toml", MODEL), ("model.toml", 'x = "a.toml"')], "one model or study|is of a kind"), ([], "at most 20"),
+        ([("a.toml", '[rig]\nkind = "sent.py"\n')], "was not uploaded"), ([("a.toml", "x = 1")], "unknown kind"),
+        ([("a.toml", MODEL), ("model.toml", 'x = "a.toml"')], "one model or study|is of an unknown kind"),
+        ([], "at most 20"),
     ],
 )  # fmt: skip
 def test_files_that_are_none_are_told_so(served: Served, files: list[tuple[str, str]], said: str) -> None:
@@ -146,7 +147,7 @@ def test_a_person_reads_the_code_and_lets_it_run(page: Any, law: tuple[str, Path
     (tmp_path / "mine.toml").write_text(STUDY)
     (tmp_path / "sent.py").write_text(f"{code}# \u202edesrever\n")
     drop(page, tmp_path / "mine.toml", tmp_path / "sent.py")
-    page.get_by_role("heading", name="It asks to run Python code").wait_for()
+    page.get_by_role("heading", name="It requires Python code").wait_for()
     assert page.locator(".ask pre").inner_text() == f"{code}# ⟨U+202E⟩desrever\n"
     allow = page.get_by_role("button", name="Run this code")
     assert allow.is_disabled()
@@ -154,9 +155,9 @@ def test_a_person_reads_the_code_and_lets_it_run(page: Any, law: tuple[str, Path
     page.reload()
     allow.wait_for()
     assert not mark.exists()
-    page.get_by_label("I have read it").check()
+    page.get_by_label("I have reviewed it").check()
     allow.click()
-    page.get_by_role("button", name="Run it").click()
+    page.get_by_role("button", name="Run", exact=True).click()
     page.get_by_role("link", name="Open the report").wait_for()
     assert mark.exists()
     assert page.locator("tbody tr").count() == 1

@@ -192,7 +192,7 @@ def test_a_log_reads_its_own_file(served: Served, sent: SentFolder, tmp_path: Pa
     assert client.get(f"{sent.base}/{log}/samples").status_code == 409
     again = client.put(f"{sent.base}/{log}/reading", json={})
     assert again.status_code == 409
-    assert "is gone" in again.json()["error"]
+    assert "is missing" in again.json()["error"]
 
 
 def test_json_of_any_kind_does_not_break_the_page(served: Served, sent: SentFolder) -> None:

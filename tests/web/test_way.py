@@ -41,12 +41,12 @@ def test_from_a_dropped_log_to_c_that_compiles(
     inertia = float(re.search(r"inertia\s+(\S+)", numbers)[1].replace("−", "-"))
     assert 3.3e-4 < inertia < 4.8e-4  # true: 4e-4
     page.get_by_label("Bandwidth of the position loop").fill("20")
-    page.get_by_label("Encoder, counts a revolution").fill("65536")
+    page.get_by_label("Encoder counts per revolution").fill("65536")
     page.get_by_label("Torque limit").fill("3")
     page.get_by_role("button", name="Recommend a setting").click()
     page.wait_for_selector(".view.setting .verdict")
     assert "Switch on: feedforward" in page.locator(".verdict h2").inner_text()
-    page.get_by_role("button", name="Make the archive").click()
+    page.get_by_role("button", name="Download (.zip)").click()
     with page.expect_download() as download:
         page.get_by_role("link", name="Download recommended-c99.zip").click()
     download.value.save_as(tmp_path / "c.zip")
@@ -88,7 +88,7 @@ def test_a_reload_in_the_middle_of_an_identification_loses_nothing(page: Any) ->
     page.get_by_role("button", name="Identify", exact=True).click()
     page.wait_for_selector(".job")
     page.reload()
-    page.wait_for_selector(".job .said:not(:has-text('waiting for its turn'))")
+    page.wait_for_selector(".job .said:not(:has-text('waiting'))")
     page.wait_for_selector(".job", state="detached")
     page.get_by_role("link", name="Logs and results").click()
     page.get_by_role("link", name="Friction of demo.csv").click()
@@ -103,7 +103,7 @@ def test_cancel_ends_the_work_and_keeps_the_log(page: Any, served: Served) -> No
     drop(page, DEMO)
     page.wait_for_selector(".view.log .findings")
     page.get_by_role("button", name="Identify", exact=True).click()
-    page.wait_for_selector(".job .said:not(:has-text('waiting for its turn'))")
+    page.wait_for_selector(".job .said:not(:has-text('waiting'))")
     server, at_work = psutil.Process(served.process.pid), []
     for _ in range(100):
         at_work = at_work or [p for p in server.children(recursive=True) if not waits(p)]
@@ -135,7 +135,7 @@ def test_a_log_whose_columns_say_nothing_is_read_by_the_form(page: Any, tmp_path
     for channel, column, unit in (("time", "a", "s"), ("position", "b", "deg"), ("motor_torque", "c", "mNm")):
         page.locator(f"select[name='column-{channel}']").select_option(column)
         page.locator(f"input[name='unit-{channel}']").fill(unit)
-    page.get_by_role("button", name="Read it so").click()
+    page.get_by_role("button", name="Apply").click()
     page.wait_for_selector("figcaption:has-text('motor torque against position')")
     page.wait_for_selector(".summary:has-text('−4.733 to 2.161 rad')")
     assert page.locator(".findings .good, .findings .fair").count() == 1
@@ -146,7 +146,7 @@ def test_without_the_token_the_page_says_what_to_do(browser: Any, served: Served
     page = browser.new_page()
     page.goto(served.url)
     page.wait_for_selector("h1:has-text('Open the address with its token')")
-    assert "printed, to its end" in page.locator("main").inner_text()
+    assert "Copy all of it from the terminal" in page.locator("main").inner_text()
     assert page.locator(".drop").count() == 0
     page.close()
 

@@ -64,7 +64,7 @@ def test_both_exports_give_the_numbers_that_were_shown(served: Served, tmp_path:
         ("reference.kind", "x", "kind must be one of"), ("controller.linear", "x", "linear must be one of"),
         ("controller.compensator", "evil", "compensator must be one of"), ("duration", 1e9, "duration must be"),
         ("duration", "x", "must be a finite number"), ("axis", [], "axis must be a table"),
-        ("friction.fc", "0.1", "must be a finite number"), ("friction.a b", 1.0, "is no name"),
+        ("friction.fc", "0.1", "must be a finite number"), ("friction.a b", 1.0, "is not the name"),
     ],
 )  # fmt: skip
 def test_a_case_that_is_none_is_told_so(path: str, value: Any, said: str) -> None:
@@ -97,11 +97,11 @@ def test_every_law_and_reference_is_described() -> None:
 @pytest.mark.slow
 def test_a_slider_simulates_at_once(page: Any) -> None:
     """And what was kept stays beside it."""
-    page.get_by_label("A new project, named").fill("bench")
-    page.get_by_role("button", name="Make").click()
+    page.get_by_label("New project name").fill("bench")
+    page.get_by_role("button", name="Create").click()
     page.get_by_role("link", name="Workbench").click()
     page.wait_for_selector("[data-ms]")
-    page.get_by_role("button", name="Keep this run beside").click()
+    page.get_by_role("button", name="Pin run").click()
     before = page.locator("tr", has_text="position rms (rad)").locator("td").all_inner_texts()
     assert before[0] == before[1]
     page.get_by_label("bandwidth, slider").focus()

@@ -1,11 +1,11 @@
 """A controller made of control laws as a linear sampled system about rest: matrices, transfer function, margins.
 
-The matrices are taken from the text that runs: what one sample of the composition makes of a small change of every
-number that it remembers, and of the measured angle. A friction law that a block holds is the spring and damper that it
-is for motion of that amplitude (`stickslip.analyse.presliding_loop.describing`), and nothing while it slides. What a
-law does only at its torque limit, or only while the reference rests, does not enter. A law that is not smooth about
-rest is refused, and one that is dead there. What is smooth may bend soon: `linear_to` says up to which motion the
-matrices are the law's.
+The matrices are derived from the text that runs: from the response of one sample of the composition to a small change
+of every state and of the measured angle. A friction law in a block becomes its spring and damper for motion of that
+amplitude (`stickslip.analyse.presliding_loop.describing`), and nothing while it slides. Behaviour at the torque limit
+only, or only while the reference rests, is not included. A law that is not smooth about rest, or has a dead band there,
+is refused. A smooth law may still bend at small motion: `linear_to` returns the motion up to which the matrices are
+valid.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from stickslip.spec import Law, Par
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 AGREES = 0.2
-"""Part of the largest torque by which a motion's torque may differ from that of the matrices that stand for it."""
+"""Relative deviation of a motion's torque from that of the matrices, as a share of the largest torque."""
 FINER = math.sqrt(10.0)
-"""Between the sizes of motions that are tried."""
+"""Ratio of successive amplitudes."""
 LONG = 200
-"""Samples over which numbers are compared in size, and torques of a motion."""
+"""Samples over which states and torques are compared."""
 SPANNED = 1e-9
-"""Part of a vector that has to be new for a motion of its own."""
+"""Share of a vector that must be new to count as an independent motion."""
 
 
 class Params(NamedTuple):
-    """Spring and damper."""
+    """A spring and a damper."""
 
     stiffness: Annotated[float, Par("N·m/rad", "k", "stiffness", lower=0.0)]
     damping: Annotated[float, Par("N·m·s/rad", "d", "damping")]
 
 
 class State(NamedTuple):
-    """What the spring remembers."""
+    """State of the spring."""
 
     angle: Annotated[float, Par("rad", "x", "angle of the spring")]
 
@@ -60,7 +60,7 @@ SPRING = Law(
     "spring_and_damper", Params, spring, title="Spring and damper", equation=r"F = k x + d v",
     source=("thesis 5.2",), example={"stiffness": 100.0, "damping": 0.01}, State=State,
 )  # fmt: skip
-"""What a held friction law is about rest."""
+"""Linear form of a friction law in a block about rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +74,9 @@ class LinearController:
     sample_time : float
         s
     delay : float
-        By how much of a sample time, or of several, the torque comes late.
+        Delay of the torque, in samples; may be fractional.
     factor : float
-        On the torque.
+        Factor on the torque.
     """
 
     matrices: tuple[Array, Array, Array, float]
@@ -85,14 +85,14 @@ class LinearController:
     factor: float = 1.0
 
     def state_space(self) -> tuple[Array, Array, Array, float]:
-        """A, B, C, D."""
+        """The matrices A, B, C, D."""
         a, b, c, d = self.matrices
         return a, b, self.factor * c, self.factor * d
 
     def response(self, frequency: Array) -> Any:
-        """The transfer function from measured angle to torque at frequencies in Hz, N·m/rad, complex.
+        """Return the transfer function from measured angle to torque at frequencies in Hz, N·m/rad, complex.
 
-        Its sign is that of a controller: a stiffness gives -k.
+        The sign is that of a controller: a stiffness gives -k.
         """
         a, b, c, d = self.state_space()
         turn = np.exp(2j * math.pi * np.asarray(frequency) * self.sample_time)
@@ -103,28 +103,28 @@ class LinearController:
 
 
 def float_of(one: Any) -> complex:
-    """The one number of a matrix."""
+    """Return the only element of a matrix."""
     return complex(one[0, 0])
 
 
 def linearised(
     controller: Controller, amplitude: float, frequency: float, delay: float = 0.0
 ) -> LinearController:
-    """The controller about rest.
+    """Return the controller linearised about rest.
 
     Parameters
     ----------
     controller : Controller
     amplitude, frequency : float
-        Of the small motion that held friction laws see, rad and Hz; an infinite amplitude for laws that slide. Other
-        laws are what they are for changes so small that they do not bend: maybe of a smaller motion, `linear_to`.
+        Of the small motion for which friction laws in blocks are linearised, rad and Hz; infinite for sliding laws.
+        Other laws are linearised for infinitesimal changes, which may be valid for smaller motion only (`linear_to`).
     delay : float
         Of the torque, samples.
 
     Raises
     ------
     InputError
-        If a law is not smooth about rest or has a dead band there, or the controller acts in continuous time.
+        If a law is not smooth about rest or has a dead band there, or the controller is continuous.
     """
     if controller.sample_time == 0.0:
         raise InputError(
@@ -132,28 +132,28 @@ def linearised(
         )
     run = _about_rest(controller, amplitude, frequency)
     found = [slope_at_rest(run, row) for row in np.eye(run.size + 1)]
-    whole = np.array(found).T  # what every number becomes, and the torque, by what changed it
+    whole = np.array(found).T  # responses of every state and of the torque, by the changed state
     n = run.size
-    # A friction law's spring and the last angle are the same number but for a constant: that one is no motion.
+    # The spring of a friction law and the last angle differ only by a constant, which is not a motion.
     matrices = moved_and_felt(whole[:n, :n], whole[:n, n:], whole[n:, :n])
     return LinearController((*matrices, float(whole[n, n])), controller.sample_time, delay)
 
 
 def linear_to(controller: Controller, amplitude: float, frequency: float) -> float:
-    """The motion up to which the laws are what `linearised` makes of them, rad: at most `amplitude`, 0 for none.
+    """Return the motion up to which `linearised` is valid, rad: at most `amplitude`, 0 for none.
 
-    A sine of the measured angle goes through samples and matrices; their torques must agree within `AGREES`.
+    The torques of samples and matrices for a sine of the measured angle must agree within `AGREES`.
 
     Parameters
     ----------
     controller : Controller
     amplitude, frequency : float
-        Of the sine, rad and Hz: at least a period in `LONG` samples, at most one in four.
+        Of the sine, rad and Hz: at least one period in `LONG` samples, at most one in four.
 
     Raises
     ------
     InputError
-        As of `linearised`.
+        As for `linearised`.
     """
     a, b, c, d = linearised(controller, amplitude, frequency).matrices
     turn = min(max(frequency * controller.sample_time, 1.0 / LONG), 0.25)
@@ -175,16 +175,17 @@ def linear_to(controller: Controller, amplitude: float, frequency: float) -> flo
 
 
 def _about_rest(controller: Controller, amplitude: float, frequency: float) -> Sample:
-    """A sample of the controller without its torque limit, held friction laws as springs."""
+    """Return a sample of the controller without its torque limit, with friction laws as springs."""
     return Sample(with_springs(replace(controller, torque_limit=math.inf), amplitude, frequency))
 
 
 def moved_and_felt(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array]:
-    """The part of a system that its input moves and its output feels."""
-    # What is never felt goes by its name first: mixed with the rest, rounding would be felt of it.
+    """Return the controllable and observable part of a system."""
+    # Unobservable states are removed by name first: mixed with the rest, their rounding errors would appear in the
+    # output.
     felt = _sizes(a.T, c.T) > 0.0
     a, b, c = a[np.ix_(felt, felt)], b[felt], c[:, felt]
-    for _ in range(2):  # the second time of the transposed system, which turns it back too
+    for _ in range(2):  # the second time for the transposed system, which also transposes it back
         sizes = _sizes(a, b)
         moves = sizes > 0.0
         scale, a, b, c = sizes[moves], a[np.ix_(moves, moves)], b[moves], c[:, moves]
@@ -196,7 +197,7 @@ def moved_and_felt(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array]:
 
 
 def _sizes(a: Array, b: Array) -> Array:
-    """The largest value of every number after an impulse, shape (n,)."""
+    """Return the largest value of every state after an impulse, shape (n,)."""
     x, largest = b[:, 0], np.abs(b[:, 0])
     for _ in range(LONG):
         if not float(largest.max(initial=0.0)) < 1e100:
@@ -207,9 +208,9 @@ def _sizes(a: Array, b: Array) -> Array:
 
 
 def _krylov(a: Array, b: Array) -> Array:
-    """An orthonormal base of what b, A b, A A b, ... span, shape (n, rank)."""
+    """Return an orthonormal basis of the span of b, A b, A A b, ..., shape (n, rank)."""
     base = np.zeros((len(a), 0))
-    # What A makes of a unit vector may be nothing but rounding.
+    # The product of A and a unit vector may consist of rounding errors only.
     v, size, largest = b[:, 0], float(np.linalg.norm(b)), float(np.linalg.norm(a))
     while base.shape[1] < len(a):
         for _ in range(2):  # once is not enough to full precision
@@ -223,7 +224,7 @@ def _krylov(a: Array, b: Array) -> Array:
 
 
 def with_springs(controller: Controller, amplitude: float, frequency: float) -> Controller:
-    """The controller with a spring and damper for every friction law that it holds."""
+    """Return the controller with a spring and damper in place of every friction law."""
     return controller.with_blocks(_stuck(b, amplitude, frequency) for b in controller.blocks.values())
 
 

@@ -1,4 +1,4 @@
-"""How far a controller made of control laws is from instability on a machine, while its contact sticks and slides."""
+"""Stability margins of a controller made of control laws on a machine, for a sticking and a sliding contact."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from stickslip.messages import name_option, render
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 MOST, LEAST = 100.0, 0.01
-"""Factors on the torque between which the loop is looked at."""
+"""Range of the factors on the torque."""
 LATEST = 20.0
-"""Samples of delay that are looked at."""
+"""Range of the delay, samples."""
 FAST = 50.0
-"""Times the velocity over which friction changes: fast sliding."""
+"""Multiple of the velocity over which friction changes: fast sliding."""
 DRAWN = 200
 INTEGRATES = 1e-6
-"""Distance from 1 of the pole of an integral action; of one that leaks it is larger."""
+"""Distance from 1 of the pole of an integral action; larger for a leaky one."""
 HUNTING = (
     "the loop integrates and friction holds {} at rest; whether it hunts (sticks and slips for ever) no poles tell: "
     'simulate a step of 60 s or more (`ss.simulate(machine, controller, ss.Reference("step", amplitude=0.1), 120.0)`, '
     "`stickslip simulate FILE.toml --json`) and read the metric limit_cycle_amplitude_rad"
 )
-"""What is said of a loop that may hunt, with the static friction."""
+"""Message for a loop that may hunt, with the static friction."""
 
 
 @dataclass(frozen=True)
@@ -48,15 +48,14 @@ class LoopMargins:
     poles : Poles
         The least stable one.
     torque : tuple of float
-        The loop is stable for all factors on the controller's torque between these, of which 1 is one; NaN where it is
-        not stable.
+        The loop is stable for all factors on the controller's torque in this range, which contains 1; NaN if it is
+        unstable.
     delay : float
-        Samples by which the torque may come later besides; NaN where it is not stable.
+        Additional delay of the torque that the loop tolerates, samples; NaN if it is unstable.
     phase : float
-        Phase margin, degrees: the least where the loop's transfer function crosses 1; infinite where it does not,
-        NaN where the loop is not stable.
+        Smallest phase margin at a crossover, degrees; infinite without crossover, NaN if the loop is unstable.
     crossover : float
-        Frequency there, Hz; NaN where there is none.
+        Crossover frequency, Hz; NaN without one.
     """
 
     name: str
@@ -68,7 +67,7 @@ class LoopMargins:
 
     @property
     def gain_dB(self) -> tuple[float, float]:
-        """Gain margins, dB: how much less (negative) and more torque the loop bears; infinite beyond what is tried."""
+        """Gain margins, dB: downwards (negative) and upwards; infinite beyond the range tested."""
         low, high = self.torque
         return (
             20.0 * math.log10(low) if not low <= LEAST else -math.inf,
@@ -76,7 +75,7 @@ class LoopMargins:
         )
 
     def margins(self) -> str:
-        """Gain and phase margin, in words."""
+        """Return gain and phase margin as text."""
         low, high = self.gain_dB
         less = f", {low:.1f} dB" if math.isfinite(low) else ""
         more = f"{high:.1f} dB" if math.isfinite(high) else f"> {20.0 * math.log10(MOST):.0f} dB"
@@ -88,7 +87,7 @@ class LoopMargins:
         return f"{self.name}, gain margin {more}{less}; {turn}"
 
     def line(self) -> str:
-        """A row of the table."""
+        """Return a row of the table."""
         verdict = "stable" if self.poles.stable else "unstable"
         pole = f"{self.poles.growth:+9.1f}/s at {self.poles.frequency:5.1f} Hz"
         if not self.poles.stable:
@@ -107,25 +106,25 @@ class ControllerStability:
     Attributes
     ----------
     laws : tuple of str
-        What it is made of, ``observer: disturbance_observer``.
+        Its control laws, such as ``observer: disturbance_observer``.
     loops : tuple of LoopMargins
         Sticking, sliding.
     amplitude : float
         Of the small motion at the encoder, rad.
     stiffness : float
-        Of the contact as the encoder sees it, N·m/rad.
+        Stiffness of the contact as seen by the encoder, N·m/rad.
     estimator_delay : float
         Of the velocity, s.
     softer : float
-        The part of the contact that may be missing while it sticks; NaN where the loop is unstable anyway.
+        Relative loss of contact stiffness that the sticking loop tolerates; NaN if the loop is unstable.
     cycle : Cycle or None
-        Where an unstable loop ends while it sticks.
+        Limit cycle of an unstable loop while the contact sticks.
     held : float
-        Static friction that an integral action works against, N·m; 0 where there is none of either. Whether such a
-        loop hunts (sticks and slips for ever) its poles do not tell.
+        Static friction that an integral action works against, N·m; 0 without either. Poles cannot tell whether such a
+        loop will hunt (stick-slip limit cycle).
     linear_to : float
-        Motion at the encoder up to which the laws are linear at the frequencies of both loops, rad, and these loops
-        theirs; at most `reach`. Below `amplitude` there are no poles to be told (`is_linear`).
+        Motion at the encoder up to which the laws are linear at the frequencies of both loops, rad; at most `reach`. If
+        it is below `amplitude`, the poles are not reported (`is_linear`).
     frequency, response : arrays, shape (n,)
         Hz, and the transfer function from error to torque while the contact sticks, N·m/rad, complex.
     """
@@ -145,27 +144,27 @@ class ControllerStability:
 
     @property
     def is_linear(self) -> bool:
-        """Whether the controller is linear over the motion that its poles are said of: else it has none."""
+        """Whether the controller is linear over the motion to which its poles apply."""
         return self.linear_to >= self.amplitude
 
     @property
     def told_cycle(self) -> Cycle | None:
-        """The cycle, where the controller is linear up to it."""
+        """The cycle, if the controller is linear up to it."""
         return self.cycle if self.linear_to >= self.reach else None
 
     @property
     def reach(self) -> float:
-        """The largest motion that is spoken of, rad: the small one, or what it grows to."""
+        """The largest motion in the report, rad: the small one, or the limit to which it grows."""
         return reach_of(self.amplitude, self.cycle)
 
     def _contact(self) -> str:
-        """What holds the axis while it sticks, in words."""
+        """Return a text about the contact that holds the axis while it sticks."""
         if self.stiffness == 0.0:
             return "a contact without springs, which holds the axis where it sticks"
         return f"contact {self.stiffness:.1f} N·m/rad"
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {
             "laws": list(self.laws), "amplitude": self.amplitude, "contact_stiffness": self.stiffness,
             "sample_time": self.sample_time, "estimator_delay": self.estimator_delay, "softer": self.softer,
@@ -188,7 +187,7 @@ class ControllerStability:
         return "\n".join(["<ControllerStability:", *(f"  {line}" for line in self.lines())]) + ">"
 
     def lines(self) -> Iterator[str]:
-        """What people read."""
+        """Return the lines of the report."""
         yield f"controller: {'; '.join(self.laws)}"
         yield (
             f"sample time {1e3 * self.sample_time:g} ms, velocity {1e3 * self.estimator_delay:.3g} ms late; motion of "
@@ -207,18 +206,18 @@ class ControllerStability:
             yield HUNTING.format(quantity(self.held, "N·m"))
 
     def _poles(self) -> Iterator[str]:
-        """Poles and margins of both loops, and where an unstable one ends."""
+        """Return poles and margins of both loops, and the limit cycle of an unstable one."""
         yield f"{'':<10}{'':<10}{'least stable pole':<22}{'torque times':>16}{'samples later':>16}"
         for loop in self.loops:
             yield loop.line()
         yield from (loop.margins() for loop in self.loops if loop.poles.stable)
         if math.isfinite(self.softer) and self.stiffness > 0.0:
-            yield f"sticking, {100.0 * self.softer:.0f} % of the contact may be missing"
+            yield f"sticking, {100.0 * self.softer:.0f} % loss of contact stiffness tolerated"
         if found := self.told_cycle:
-            # By the first harmonic of a contact that slips more and more; what slides all the time holds nothing.
+            # Describing function of a contact that slips increasingly; a contact that always slides holds nothing.
             larger = "" if self.loops[1].poles.stable else ", or a larger one, since sliding is unstable too"
             yield (
-                "sticking, the motion grows on"
+                "sticking, the motion grows without limit"
                 if math.isinf(found.amplitude)
                 else f"sticking, it ends in a cycle of {1e6 * found.amplitude:.0f} µrad at {found.frequency:.0f} Hz"
                 + larger
@@ -228,14 +227,14 @@ class ControllerStability:
 
 
 def reach_of(amplitude: float, cycle: Cycle | None) -> float:
-    """The largest motion of a loop, rad; of one that grows on, the largest one that is tried."""
+    """Return the largest motion of a loop, rad; if it grows without limit, the largest one tested."""
     if cycle is None:
         return amplitude
     return min(cycle.amplitude, float(AMPLITUDES[-1]) * amplitude)
 
 
 def controller_stability(axis: Axis, controller: Controller, delay: float = 0.0) -> ControllerStability:
-    """Poles and margins of a controller on an axis.
+    """Return poles and margins of a controller on an axis.
 
     Parameters
     ----------
@@ -273,26 +272,27 @@ def controller_stability(axis: Axis, controller: Controller, delay: float = 0.0)
 
 
 def held_against(axis: Axis, controller: Controller, sliding: LinearController) -> float:
-    """Static friction of the contact, N·m, where the controller, here as it is while everything slides, integrates."""
+    """Return the static friction of the contact, N·m, if the controller (for sliding motion) integrates, else 0."""
     poles = np.linalg.eigvals(sliding.state_space()[0])
-    # A law that may integrate has no such pole where its gain is 0.
+    # An integrating law with gain 0 has no such pole.
     declared = any(block.law.integrates for block in controller.blocks.values())
     if not declared or not np.any(np.abs(poles - 1.0) < INTEGRATES):
         return 0.0
     try:
         return max(static_level(axis.friction, direction) for direction in (1.0, -1.0))
-    except ParameterError:  # a law that does not say what it holds
+    except ParameterError:  # a law that does not state its holding torque
         return 0.0
 
 
 def straight_to(axis: Axis, controller: Controller, reach: float, *poles: Poles) -> float:
-    """The motion up to `reach` up to which the controller is linear at every frequency that these poles have, rad."""
+    """Return the motion, at most `reach`, up to which the controller is linear at the frequencies of these poles,
+    rad."""
     every = {p.frequency if p.frequency >= SLOW else axis.ringing for p in poles}
     return min(linear_to(controller, reach, frequency) for frequency in every)
 
 
 def slid(axis: Axis) -> Drivetrain:
-    """The drivetrain while its contact slides fast: friction is a constant torque, and a damper by its viscous part."""
+    """Return the drivetrain during fast sliding: friction is a constant torque plus viscous damping."""
     law, p = axis.friction.law, axis.friction.parameters
     slope = 0.0
     if law.steady:
@@ -305,7 +305,7 @@ def slid(axis: Axis) -> Drivetrain:
 def about(
     axis: Axis, controller: Controller, delay: float, amplitude: float
 ) -> tuple[Drivetrain, LinearController]:
-    """Drivetrain and controller at an amplitude of the encoder, the laws as they are at the loop's own frequency."""
+    """Return drivetrain and controller at an amplitude of the encoder, with the laws at the loop's own frequency."""
 
     def at(frequency: float) -> tuple[Drivetrain, LinearController]:
         return axis.at(amplitude, frequency), linearised(controller, amplitude, frequency, delay)
@@ -320,7 +320,7 @@ def about(
 
 
 def margins(name: str, drivetrain: Drivetrain, drive: LinearController) -> LoopMargins:
-    """Poles, and how much more torque and delay the loop bears."""
+    """Return the poles and the margins for torque and delay."""
     loop = Loop(drivetrain, drive)
     poles = loop.poles()
     if not poles.stable:
@@ -338,7 +338,7 @@ def margins(name: str, drivetrain: Drivetrain, drive: LinearController) -> LoopM
 
 
 def cycle_of(axis: Axis, controller: Controller, delay: float, first: Poles) -> Cycle | None:
-    """Where the growth of a loop that is unstable at the small amplitude ends as the amplitude rises."""
+    """Return the limit cycle of a loop that is unstable at the small amplitude."""
     if first.stable:
         return None
 

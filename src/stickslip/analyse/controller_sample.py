@@ -1,4 +1,4 @@
-"""A sample of a controller about rest: what it makes of small changes of every number that it remembers."""
+"""Responses of a sample of a controller at rest to small changes of its states."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ CARRIED = (
     "feedforward",
     "others",
 )
-"""Of the composition's memory, what a sample hands to the next; the rest are flags and clocks."""
+"""States of the composition that a sample passes to the next; the rest are flags and clocks."""
 
 
 def suspects(controller: Controller) -> str:
-    """The laws that are not declared linear, or all of them."""
+    """Return the laws that are not declared linear, or all of them."""
     names = [
         b.law.name for b in controller.blocks.values() if not b.law.is_linear and not b.law.holds_friction
     ]
@@ -38,7 +38,7 @@ def suspects(controller: Controller) -> str:
 
 
 class Sample:
-    """One sample of a controller about rest, from small changes of what it remembers and measures."""
+    """One sample of a controller about rest, for small changes of its states and measurements."""
 
     def __init__(self, controller: Controller) -> None:
         self.n, self.p = controller.settings, controller.parameters
@@ -49,21 +49,21 @@ class Sample:
             self._torque(0.0, self.m, self.z, self.u)
         self.rest = self._flat(self.m, self.z)
         self.size = len(self.rest)
-        # A constant torque stands at rest, and what observes it moves on: neither is an answer to a change.
+        # A constant torque at rest and the drift of observers are not responses to a change.
         self.unchanged = self._after(np.zeros(self.size + 1))
 
     def answers(self, change: Array) -> Array:
-        """What the sample makes of a change, shape (size + 1,): of every number, and of the torque."""
+        """Return the response of the sample to a change, shape (size + 1,): of every state, and of the torque."""
         return self._after(change) - self.unchanged
 
     def torques(self, angles: Array) -> Array:
-        """The torques of samples from rest on, N·m; no numbers from where the law gives none."""
+        """Return the torques of samples starting from rest, N·m; NaN where the law gives none."""
         m, z, u = _copied(self.m), _copied(self.z), _copied(self.u)
         out = np.full(len(angles), math.nan)
         for i, angle in enumerate(angles.tolist()):
             try:
                 out[i] = self._torque(angle, m, z, u)
-            except InputError:  # LawError too: of this motion it says enough that there is no torque
+            except InputError:  # LawError too: it is enough to know that this motion has no torque
                 break
         return out
 
@@ -74,29 +74,30 @@ class Sample:
         return np.append(self._flat(m, z), torque)
 
     def _torque(self, position: float, m: Any, z: Any, u: Any) -> float:
-        """The torque of a sample; `InputError` where the law gives none at rest."""
+        """Return the torque of a sample; `InputError` if the law gives none at rest."""
         sample = self.controller.functions["sample"]
         torque = plain_sample(sample, position, 0.0, 0.0, 0.0, self.n, m, z, self.p, u)
         if m.fault != 0.0:
             raise InputError(
-                f"controller: {suspects(self.controller)} gives a torque that is no finite number at rest, so that "
-                "there is no linear loop; let it return a torque there too"
+                f"controller: {suspects(self.controller)} gives a torque that is not finite at rest, so "
+                "there is no linear loop; make it return a torque there too"
             )
         return torque
 
     def name_of(self, place: int) -> str:
-        """What a number that is changed is, for people."""
+        """Return the name of a changed state as text."""
         names = [*CARRIED, *_names(self.z)]
-        return "the measured angle" if place == self.size else f"{names[place]!r}, which it remembers"
+        return "the measured angle" if place == self.size else f"its state {names[place]!r}"
 
     def telling(self, places: Array) -> int:
-        """The place that tells most of some of an answer: a law's own number, else the torque, else what is kept."""
+        """Return the most informative index of a response: a state of a law, else the torque, else a state of the
+        composition."""
         found = np.flatnonzero(places)
         own = found[(found >= len(CARRIED)) & (found < self.size)]
         return int((own if own.size else found[::-1])[0])
 
     def answer_name(self, place: int) -> str:
-        """What a number of an answer is, for people."""
+        """Return the name of an element of a response as text."""
         return "the torque" if place == self.size else [*CARRIED, *_names(self.z)][place]
 
     def _flat(self, m: Any, z: Any) -> Array:
@@ -110,7 +111,7 @@ class Sample:
 
 
 def _copied(part: Any) -> Any:
-    """A state of its own; `copy.deepcopy`, which looks for what is shared, takes as long as a sample."""
+    """Return a copy of a state; `copy.deepcopy`, which looks for shared objects, takes as long as a sample."""
     out = copy.copy(part)
     for name, value in cast("dict[str, Any]", vars(part)).items():
         if isinstance(value, SimpleNamespace):
@@ -121,7 +122,7 @@ def _copied(part: Any) -> Any:
 
 
 def _numbers(part: Any) -> list[float]:
-    """The numbers of a state, its parts' too."""
+    """Return the numbers of a state and its parts."""
     out: list[float] = []
     for value in cast("dict[str, Any]", vars(part)).values():
         if isinstance(value, SimpleNamespace):
@@ -132,7 +133,7 @@ def _numbers(part: Any) -> list[float]:
 
 
 def _names(part: Any, before: str = "") -> list[str]:
-    """The names of the numbers of `_numbers`."""
+    """Return the names of the numbers of `_numbers`."""
     out: list[str] = []
     for name, value in cast("dict[str, Any]", vars(part)).items():
         if isinstance(value, SimpleNamespace):

@@ -1,7 +1,8 @@
 """Torque against position and against time while the axis slides; thesis 2.1.5, 2.1.6, figures 4.6, 4.7, 4.29 to 4.32.
 
-Every revolution of every record is a pass: the torque over the angle of the shaft. Passes at different times tell drift
-from dependence on position: "the shape of the friction curve is almost kept while the amplitude is changing in time".
+Every revolution of every record is a pass: the torque over the angle of the shaft. Passes at different times separate
+drift from dependence on position: "the shape of the friction curve is almost kept while the amplitude is changing in
+time".
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from stickslip.record import Record
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BINS = 72
-"""Of a revolution, 5 degrees each: torques are averaged in them, as the thesis filtered its sensor's."""
+"""Bins of a revolution, 5 degrees each, for averaging torques; the thesis filtered its sensor's torque."""
 FULL = 0.9
-"""Share of the bins that a pass must fill."""
+"""Share of the bins that a pass must cover."""
 HARMONICS = 4
 SAME_VELOCITY = 0.02
-"""Relative difference of the mean velocities of repeated passes."""
+"""Largest relative difference of the mean velocities of repeated passes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +42,7 @@ class Pass:
     velocity : float
         Mean, rad/s.
     torque : array, shape (BINS,)
-        N·m over the angle, in the direction of motion; NaN where the pass has no samples.
+        N·m over the angle, in the direction of motion; NaN in bins without samples.
     """
 
     name: str
@@ -57,16 +58,16 @@ class Pass:
 
     @property
     def swing(self) -> float:
-        """Peak to peak over the angle, N·m."""
+        """Peak-to-peak value over the angle, N·m."""
         return float(np.nanmax(self.torque) - np.nanmin(self.torque))
 
     def is_repeat_of(self, other: Pass) -> bool:
-        """Whether it is the same torque at the same velocity, in the same direction."""
+        """Whether it is the same channel at the same velocity and direction."""
         same = abs(self.velocity - other.velocity) <= SAME_VELOCITY * abs(other.velocity)
         return same and self.channel == other.channel
 
     def harmonics(self, count: int = HARMONICS) -> Array:
-        """Amplitudes of the first harmonics of a revolution, N·m, by least squares."""
+        """Return the amplitudes of the first harmonics of a revolution, N·m, by least squares."""
         good = np.isfinite(self.torque)
         angle = (np.flatnonzero(good) + 0.5) * 2.0 * math.pi / BINS
         columns = [np.ones_like(angle)]
@@ -94,12 +95,12 @@ class Dependence:
 
     @property
     def angle(self) -> Array:
-        """Middles of the bins, rad."""
+        """Centres of the bins, rad."""
         return (np.arange(BINS) + 0.5) * 2.0 * math.pi / BINS
 
     @property
     def alike(self) -> float:
-        """Least correlation of a pass with the first: 1 where the shape over the angle is kept."""
+        """Smallest correlation of a pass with the first: 1 if the shape over the angle is constant."""
         first = self.passes[0].torque
         found = [
             float(np.corrcoef(first[good], p.torque[good])[0, 1])
@@ -110,7 +111,7 @@ class Dependence:
 
     @property
     def drift(self) -> float:
-        """Greatest range of the means of passes at one velocity in one direction, relative to their mean.
+        """Largest range of the means of passes at one velocity and direction, relative to their mean.
 
         NaN if no velocity is repeated.
         """
@@ -125,7 +126,7 @@ class Dependence:
         return max((float(np.ptp(m) / abs(np.mean(m))) for m in means), default=math.nan)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {
             "channel": self.channel, "alike": self.alike, "drift": self.drift,
             "passes": [
@@ -138,7 +139,7 @@ class Dependence:
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """What people read."""
+        """Return the lines of the report."""
         rows = [
             f"{p.name}: at {p.time:7.1f} s, {p.velocity:+.4g} rad/s: mean {p.mean:.4f} N·m, "
             f"peak to peak {p.swing:.4f}, harmonics {', '.join(f'{1e3 * a:.1f}' for a in p.harmonics())} mN·m"
@@ -147,7 +148,7 @@ class Dependence:
         if len(self.passes) < 2:
             return rows
         change = f"the mean changes by {100 * self.drift:.3g} % at one velocity and direction, "
-        kept = f"the shape is kept to a correlation of {self.alike:.3f}"
+        kept = f"the shape is constant with a correlation of {self.alike:.3f}"
         return [*rows, f"over the passes {change if math.isfinite(self.drift) else ''}{kept}"]
 
 
@@ -157,7 +158,7 @@ def dependence(
     *more: str,
     transient: float = math.radians(20.0),
 ) -> Dependence:
-    """Torque over the angle, for every revolution of every record.
+    """Return the torque over the angle, for every revolution of every record.
 
     Parameters
     ----------
@@ -166,14 +167,14 @@ def dependence(
     channel : str
         A torque.
     *more : str
-        Further torques of the same records, whose passes come beside.
+        Further torques of the same records; their passes are added.
     transient : float
-        Travel that is left out at the start, rad (the thesis leaves out 20 degrees).
+        Travel to ignore at the start, rad (thesis: 20 degrees).
 
     Raises
     ------
     ParameterError, InputError
-        InputError if no record holds a whole revolution.
+        InputError if no record contains a whole revolution.
     """
     if not (transient >= 0.0 and math.isfinite(transient)):
         raise ParameterError(f"dependence: transient = {transient:g} rad must be 0 or greater")
@@ -185,7 +186,7 @@ def dependence(
     )
     if not passes:
         raise InputError(
-            f"dependence: no record fills {100 * FULL:g} % of a revolution behind the first "
+            f"dependence: no record covers {100 * FULL:g} % of a revolution after the first "
             f"{math.degrees(transient):g} degrees; give longer ones, or less transient"
         )
     return Dependence(channel if not more else "torque", passes)

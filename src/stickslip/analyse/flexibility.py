@@ -1,6 +1,7 @@
-"""What the elasticity of a drive drivetrain does: static twist, modes, and what modes are possible at all; thesis 4.5.
+"""Elasticity of a drivetrain: static twist, modes, and bounds of the modes; thesis 4.5.
 
-A drivetrain is a chain of inertias joined by springs: motor rotor, coupling, shaft, friction disk (thesis figure 4.57).
+A drivetrain is a chain of inertias connected by springs: motor rotor, coupling, shaft, friction disk (thesis figure
+4.57).
 
 Lowest possible first mode
 --------------------------
@@ -13,8 +14,8 @@ For a free chain of n inertias with total J, whose spring i has J_left before it
 
     w_1^2 >= 4 / (J sum of 1/k_i),
 
-reached with J/2 at each end and nothing between. No choice of inertias gives a lower first mode. The first n modes are
-at most w_n, so n/w_n^2 is at most the sum as well: mode n is at least sqrt(n) times this bound.
+reached with J/2 at each end and nothing in between. No distribution of inertias gives a lower first mode. The first n
+modes are at most w_n, so n/w_n^2 is at most the sum as well: mode n is at least sqrt(n) times this bound.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ from stickslip.machines.drivetrain import Chain, Modes, all_positive
 
 
 def twist(torque: float, stiffness: float) -> float:
-    """Static twist of a spring under a torque (N·m), rad; thesis 4.5."""
+    """Return the static twist of a spring under a torque (N·m), rad; thesis 4.5."""
     all_positive("flexibility", "stiffness", (stiffness,), "N·m/rad")
     return torque / stiffness
 
 
 def shaft_stiffness(diameter: float, length: float, shear_modulus: float, bore: float = 0.0) -> float:
-    """Torsional stiffness of a round shaft, G pi (d^4 - b^4) / (32 L), N·m/rad.
+    """Return the torsional stiffness of a round shaft, G pi (d^4 - b^4) / (32 L), N·m/rad.
 
     Parameters
     ----------
@@ -59,14 +60,14 @@ def shaft_stiffness(diameter: float, length: float, shear_modulus: float, bore: 
 
 
 def lowest_first_mode(stiffness: Sequence[float], total: float) -> float:
-    """The lowest first elastic mode that any inertias adding up to `total` (kg·m²) can have, Hz."""
+    """Return the lowest possible first elastic mode for inertias that add up to `total` (kg·m²), Hz."""
     all_positive("flexibility", "stiffness", stiffness, "N·m/rad")
     all_positive("flexibility", "inertia", (total,), "kg·m²")
     return math.sqrt(4.0 / (total * math.fsum(1.0 / k for k in stiffness))) / (2.0 * math.pi)
 
 
 def far_inertia(stiffness: float, frequency: float) -> float:
-    """The inertia that rings at `frequency` (Hz) on a spring whose other end is held, kg·m²."""
+    """Return the inertia that oscillates at `frequency` (Hz) on a spring with the other end fixed, kg·m²."""
     all_positive("flexibility", "stiffness", (stiffness,), "N·m/rad")
     all_positive("flexibility", "frequency", (frequency,), "Hz")
     return stiffness / (2.0 * math.pi * frequency) ** 2
@@ -74,7 +75,7 @@ def far_inertia(stiffness: float, frequency: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Flexibility:
-    """What is known of a drivetrain: `flexibility` fills it.
+    """Results of `flexibility` for a drivetrain.
 
     Attributes
     ----------
@@ -87,16 +88,16 @@ class Flexibility:
     torques : mapping of str to float
         N·m
     floor : float
-        Lowest first mode that any inertias can have, Hz.
+        Lowest possible first mode, Hz.
     chain, modes : Chain and Modes, or None
-        Where the inertias were given.
+        If the inertias were given.
     claimed : tuple of float
-        Elastic modes that someone states, first, second and so on, Hz.
+        Claimed elastic modes, first, second and so on, Hz.
     far : float or None
-        The last inertia if the first claimed mode is that inertia's frequency with the rest held, kg·m².
+        The last inertia, if the first claimed mode is its frequency with the rest fixed, kg·m².
     true_first : float or None
-        The first mode of the free drivetrain with that last inertia, the rest undivided, Hz; NaN if it exceeds the
-        total.
+        The first mode of the free drivetrain with that last inertia and the rest in one piece, Hz; NaN if it exceeds
+        the total.
     """
 
     stiffness: tuple[float, ...]
@@ -111,7 +112,7 @@ class Flexibility:
     true_first: float | None
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         out: dict[str, Any] = {k: v for k, v in vars(self).items() if k not in ("chain", "modes")}
         out["chain"] = asdict(self.chain) if self.chain else None
         out["frequencies"] = self.modes.frequencies.tolist() if self.modes else None
@@ -119,13 +120,13 @@ class Flexibility:
         return out
 
     def lines(self) -> list[str]:
-        """What people read."""
+        """Return the lines of the report."""
         springs = ", ".join(f"{k:g}" for k in self.stiffness)
         out = [f"springs {springs} N·m/rad, inertia {self.inertia:.5g} kg·m²"]
         for name, torque in self.torques.items():
             values = ", ".join(f"{x:.3g}" for x in self.twists[name])
             out.append(f"twist under {torque:.4g} N·m{f' ({name})' if name else ''}: {values} rad")
-        out.append(f"lowest first mode that any inertias of this total can have: {self.floor:.1f} Hz")
+        out.append(f"lowest possible first mode for this total inertia: {self.floor:.1f} Hz")
         if self.chain and self.modes:
             parts = ", ".join(f"{x:.4g}" for x in self.chain.inertias)
             listed = ", ".join(f"{f:.4g}" for f in self.modes.frequencies)
@@ -135,7 +136,7 @@ class Flexibility:
         return out
 
     def lowest(self, order: int) -> float:
-        """The lowest frequency that an elastic mode (1: the first) can have with any inertias of this total, Hz."""
+        """Return the lowest possible frequency of an elastic mode (1: the first) for this total inertia, Hz."""
         return math.sqrt(order) * self.floor
 
     def _verdict(self, order: int, claim: float) -> str:
@@ -145,7 +146,7 @@ class Flexibility:
         if order > 1 or self.far is None or self.true_first is None:
             return f"a {word} mode at {claim:g} Hz is impossible: it is at least {self.lowest(order):.1f} Hz"
         far, true = self.far, self.true_first
-        held = f"{far:.4g} kg·m² behind the last spring oscillates at {claim:g} Hz with the rest held"
+        held = f"{far:.4g} kg·m² after the last spring oscillates at {claim:g} Hz with the rest fixed"
         if math.isnan(true):
             return (
                 f"a first mode at {claim:g} Hz is impossible; {held}, but that is more than the whole inertia"
@@ -163,20 +164,20 @@ def flexibility(
     inertias: Sequence[float] = (),
     claimed: Sequence[float] = (),
 ) -> Flexibility:
-    """Twists, modes and the bound on the first mode of a drivetrain; thesis 4.5.
+    """Return twists, modes and the bound of the first mode of a drivetrain; thesis 4.5.
 
     Parameters
     ----------
     stiffness : sequence of float
         N·m/rad, motor side first.
     inertia : float
-        Of the whole drivetrain, kg·m²; given `inertias` add up to it within 1 %.
+        Of the whole drivetrain, kg·m²; `inertias` must add up to it within 1 %.
     torques : dict of str to float, optional
         Torques by name, N·m; the static twist of every spring is reported for each.
     inertias : sequence of float, optional
-        How the total is divided, kg·m².
+        Parts of the total, kg·m².
     claimed : sequence of float, optional
-        Elastic modes of one drivetrain to judge, Hz: the first, the second, and so on, at most one for each spring.
+        Claimed elastic modes of one drivetrain, Hz: the first, the second, and so on, at most one for each spring.
 
     Raises
     ------
@@ -186,8 +187,8 @@ def flexibility(
     all_positive("flexibility", "mode", claimed, "Hz")
     if list(claimed) != sorted(claimed) or len(claimed) > len(stiffness):
         raise ParameterError(
-            f"flexibility: modes {', '.join(f'{f:g}' for f in claimed)} Hz must ascend, at most one for each of "
-            f"{len(stiffness)} springs; judge alternatives one at a time"
+            f"flexibility: modes {', '.join(f'{f:g}' for f in claimed)} Hz must be increasing, at most one for each of "
+            f"{len(stiffness)} springs; test alternatives one at a time"
         )
     chain = Chain(tuple(inertias), tuple(stiffness)) if inertias else None
     if chain and abs(chain.total - inertia) > 0.01 * inertia:
@@ -205,7 +206,7 @@ def flexibility(
 
 
 def _free_first(stiffness: float, total: float, last: float) -> float:
-    """First mode of the drivetrain when only its last spring gives, Hz."""
+    """Return the first mode of the drivetrain if only its last spring is elastic, Hz."""
     if last >= total:
         return math.nan
     return float(Chain((total - last, last), (stiffness,)).modes().frequencies[1])

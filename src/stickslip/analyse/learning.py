@@ -1,11 +1,10 @@
-"""Whether learning from repetition to repetition converges: ``|Q (1 - L T)|`` below 1 at every frequency.
+"""Convergence of learning from repetition to repetition: ``|Q (1 - L T)|`` below 1 at every frequency.
 
-The feedforward takes over the share L of the torque that the loop gave, through a low-pass Q without lag. T is the
-answer of that torque to a torque at the motor, in the sampled loop of the text that runs
-(`stickslip.analyse.controller_loop`) with the machine sliding: L T is the L P_s of the error's point of view, with the
-loop as learning filter. Where the condition holds, what is learned comes nearer to its limit with every repetition, by
-that factor at least (Bristow et al. 2006); where it does not, errors of that frequency grow in the end, whatever the
-first repetitions look like. Where the axis sticks, T is next to 0, and nothing is learned there in either case.
+In each repetition the feedforward adds the share L of the loop's torque, through a zero-phase low-pass Q. T is the
+response of the loop's torque to a torque at the motor, in the sampled loop (`stickslip.analyse.controller_loop`) with
+the machine sliding. Where the condition is met, the learned torque converges by at least that factor in every
+repetition (Bristow et al. 2006); where it is not, errors of that frequency grow in the end, even if the first
+repetitions look good. While the axis sticks, T is nearly 0 and nothing is learned.
 """
 
 from __future__ import annotations
@@ -26,15 +25,15 @@ from stickslip.machines.drivetrain import Drivetrain
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 DRAWN = 600
-"""Frequencies at which the condition is looked at."""
+"""Number of frequencies at which the condition is evaluated."""
 LOWEST = 1e-5
-"""Of half the sample rate: the lowest of them."""
+"""Lowest frequency, as a share of half the sample rate."""
 ADVANCES = 9
-"""Samples of advance, less one, among which `widest` chooses."""
+"""Largest advance that `widest` tries, samples, plus one."""
 KEPT = 0.95
 """Largest value of the condition that `widest` allows."""
 CORNERS = np.geomspace(0.1, 1e-3, 50)
-"""Corners of Q over the sample rate that `widest` tries, from above."""
+"""Corners of Q as shares of the sample rate that `widest` tries, in descending order."""
 
 
 @dataclass(frozen=True)
@@ -44,15 +43,16 @@ class Convergence:
     Attributes
     ----------
     worst : float
-        Largest ``|Q (1 - L T)|``: the factor by which a repetition leaves the learned torque off its limit, at most.
+        Largest ``|Q (1 - L T)|``: the share of the deviation of the learned torque from its limit that remains after a
+        repetition, at most.
     frequency : float
-        Where it is, Hz.
+        Its frequency, Hz.
     rate : float
         L.
     corner : float
-        Of Q, Hz: where it lets 0.71 through.
+        Corner of Q, Hz: gain 0.71.
     advance : int
-        Samples by which the torque that was learned from is given earlier.
+        Samples by which the learned torque is applied earlier.
     """
 
     worst: float
@@ -63,11 +63,11 @@ class Convergence:
 
     @property
     def holds(self) -> bool:
-        """Whether it is met."""
+        """Whether the condition is met."""
         return self.worst < 1.0
 
     def line(self) -> str:
-        """The condition in a sentence."""
+        """Return the condition as a sentence."""
         return (
             f"|Q (1 - L T)| is at most {self.worst:.3g} (at {self.frequency:.3g} Hz; L = {self.rate:g}, Q to "
             f"{self.corner:.3g} Hz, {self.advance} samples earlier)"
@@ -75,7 +75,7 @@ class Convergence:
 
 
 def response(drivetrain: Drivetrain, drive: LinearController, delay: float, frequency: Array) -> Any:
-    """T: what the loop takes of a torque at the motor, complex, shape (n,), at frequencies in Hz.
+    """Return T, the response of the loop's torque to a torque at the motor, complex, shape (n,), at frequencies in Hz.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def response(drivetrain: Drivetrain, drive: LinearController, delay: float, freq
     drive : LinearController
         Without delay.
     delay : float
-        Samples by which the torque acts late.
+        Delay of the torque, samples.
     frequency : array, shape (n,)
     """
     whole = math.floor(delay)
@@ -96,16 +96,16 @@ def response(drivetrain: Drivetrain, drive: LinearController, delay: float, freq
 
 
 def answers(axis: Axis, controller: Controller, delay: float) -> tuple[Array, Any]:
-    """Frequencies, Hz, and T of the sliding axis there.
+    """Return frequencies, Hz, and T of the sliding axis.
 
     Raises
     ------
     InputError
-        If a law is not smooth about rest, or the loop is not stable.
+        If a law is not smooth about rest, or the loop is unstable.
     """
     drivetrain, drive = slid(axis), linearised(controller, math.inf, axis.ringing)
     if not Loop(drivetrain, linearised(controller, math.inf, axis.ringing, delay)).poles().stable:
-        raise InputError("learning: the loop is not stable while the axis slides; lower its bandwidth first")
+        raise InputError("learning: the loop is unstable while the axis slides; lower its bandwidth first")
     frequency = np.geomspace(LOWEST, 1.0, DRAWN) * 0.5 / controller.sample_time
     return frequency, response(drivetrain, drive, delay, frequency)
 
@@ -113,7 +113,7 @@ def answers(axis: Axis, controller: Controller, delay: float) -> tuple[Array, An
 def judged(
     frequency: Array, left: Any, passed: Array, rate: float, corner: float, advance: int
 ) -> Convergence:
-    """The condition with what a repetition leaves of an error, and what Q lets through, by frequency."""
+    """Return the condition from the remaining error after a repetition and the gain of Q, by frequency."""
     size = np.abs(passed * left)
     place = int(np.argmax(size))
     return Convergence(float(size[place]), float(frequency[place]), rate, corner, advance)
@@ -122,21 +122,21 @@ def judged(
 def over_time(
     axis: Axis, controller: Controller, rate: float, corner: float, advance: int, delay: float = 0.0
 ) -> Convergence:
-    """The condition of learning over time.
+    """Return the condition for learning over time.
 
     Parameters
     ----------
     axis : Axis
     controller : Controller
-        Without what is learned.
+        Without the learned feedforward.
     rate : float
-        L, the share of the loop's torque that a repetition takes over.
+        L, the share of the loop's torque that a repetition adds.
     corner : float
         Of Q, Hz.
     advance : int
-        Samples by which it is given earlier.
+        Samples by which it is applied earlier.
     delay : float
-        Samples by which a torque acts late.
+        Delay of the torque, samples.
 
     Raises
     ------
@@ -151,9 +151,9 @@ def over_time(
 
 
 def widest(axis: Axis, controller: Controller, rate: float, delay: float = 0.0) -> Convergence:
-    """The condition with the highest corner of Q, and the advance, that keep it at `KEPT` or below.
+    """Return the condition with the highest corner of Q, and the advance, with which it is at most `KEPT`.
 
-    Parameters and errors as of `over_time`.
+    Parameters and errors as for `over_time`.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def widest(axis: Axis, controller: Controller, rate: float, delay: float = 0.0) 
 def over_angle(
     axis: Axis, controller: Controller, rate: float, width: float, speed: float, delay: float = 0.0
 ) -> Convergence:
-    """The condition of learning over the angle at the fastest motion, which asks for the highest frequencies.
+    """Return the condition for learning over the angle at the fastest motion, which has the highest frequencies.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def over_angle(
     width : float
         Of a bin, rad.
     speed : float
-        Largest of the reference, rad/s.
+        Largest velocity of the reference, rad/s.
 
     Raises
     ------
@@ -196,7 +196,7 @@ def over_angle(
         If the loop has no linear form, or is not stable.
     """
     frequency, taken = answers(axis, controller, delay)
-    waves = frequency * width / speed  # a bin: finer than half a wave a bin there is nothing in the map
+    waves = frequency * width / speed  # per bin: the map contains no waves finer than two bins
     seen = waves <= 0.5
     passed = bin_response(waves[seen])
     corner = 0.182 * speed / width  # where cos² of pi times waves a bin is 0.71

@@ -1,4 +1,4 @@
-"""A machine of the library as the linear axis that stability is computed on."""
+"""Convert a machine to the linear axis of the stability analysis."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from stickslip.machines.machine import Machine
 
 
 def axis_of(machine: Machine, amplitude: float = 0.0) -> Axis:
-    """Drivetrain and contact of a machine with the imperfections that it has; noise, ripple and drift do not enter.
+    """Return drivetrain and contact of a machine with its imperfections, except noise, ripple and drift.
 
     Parameters
     ----------
     machine : Machine
     amplitude : float
-        Of the motion at the encoder that counts as small, rad; 0 takes one count of the encoder, or 1e-6 rad.
+        Of small motion at the encoder, rad; 0: one count of the encoder, or 1e-6 rad.
     """
     counts = machine.encoder.counts
     count = 2.0 * math.pi / counts if counts > 0.0 else 1e-6

@@ -1,7 +1,9 @@
-"""Motor side against sensor side: what the bearings between them take; thesis figures 4.5, 4.8, 4.10, 4.31, 4.34.
+"""Compare motor torque with sensor torque: friction of the bearings in between; thesis figures 4.5, 4.8, 4.10, 4.31,
+4.34.
 
-The motor's torque moves everything; a torque sensor sees the friction disk alone. In sliding their difference is
-friction of what lies between, and of the inertia. The thesis finds it "similar to the Coulomb with viscous friction".
+The motor's torque moves the whole axis; a torque sensor measures the friction disk alone. During sliding their
+difference is the friction of the parts in between, plus the torque of the inertia. The thesis finds it "similar to the
+Coulomb with viscous friction".
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from stickslip.record import Record
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WINDOW = 0.1
-"""s over which both torques are averaged: the sensor's noise is larger than what is looked for."""
+"""Averaging time of both torques, s: the sensor's noise exceeds the difference of interest."""
 MOVES = 1e-3
 """rad/s below which the axis counts as at rest."""
 FEWEST = 8
@@ -28,7 +30,7 @@ FEWEST = 8
 
 @dataclass(frozen=True)
 class Point:
-    """Means over one record where it moves in one direction: velocity (rad/s), torques (N·m)."""
+    """Means over one record while it moves in one direction: velocity (rad/s), torques (N·m)."""
 
     name: str
     velocity: float
@@ -45,14 +47,14 @@ class Sides:
     points : tuple of Point
         One per record and direction.
     velocity, motor, sensor : array, shape (n,)
-        Averages over 0.1 s in motion, rad/s and N·m; the motor's without J dv/dt where an inertia was given.
+        Averages over 0.1 s in motion, rad/s and N·m; the motor torque without J dv/dt if an inertia was given.
     coulomb, viscous, offset : float
-        The difference as coulomb sign(v) + viscous v + offset: N·m, N·m·s/rad, N·m. ``viscous`` and ``offset`` are 0
-        where only one speed, or one direction, was run.
+        The difference as coulomb sign(v) + viscous v + offset: N·m, N·m·s/rad, N·m. ``viscous`` and ``offset`` are 0 if
+        there is only one speed or one direction.
     residual : float
-        RMS of what that leaves of the difference, N·m.
+        RMS of the residual of the difference, N·m.
     correlation : float
-        Of the two torques where both directions are taken for themselves: 1 where their shapes agree.
+        Of the two torques, separately for each direction: 1 if their shapes agree.
     """
 
     points: tuple[Point, ...]
@@ -66,18 +68,18 @@ class Sides:
     correlation: float
 
     def difference(self, velocity: Array) -> Array:
-        """The fitted difference at velocities, N·m."""
+        """Return the fitted difference at velocities, N·m."""
         return self.coulomb * np.sign(velocity) + self.viscous * velocity + self.offset
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data, without the samples."""
+        """Return plain data, without the samples."""
         return {
             "points": [vars(p) for p in self.points], "coulomb": self.coulomb, "viscous": self.viscous,
             "offset": self.offset, "residual": self.residual, "correlation": self.correlation,
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """What people read."""
+        """Return the lines of the report."""
         rows = [
             f"{p.name}: {p.velocity:+.4g} rad/s, motor {p.motor:+.4f}, sensor {p.sensor:+.4f}, "
             f"difference {p.motor - p.sensor:+.4f} N·m"
@@ -86,20 +88,20 @@ class Sides:
         law = f"{self.coulomb:.4g} N·m sign(v) + {self.viscous:.4g} N·m·s/rad v + {self.offset:.2g} N·m"
         return [
             *rows,
-            f"motor less sensor: {law}, leaving {self.residual:.2g} N·m RMS",
-            f"shape alike: correlation {self.correlation:.3f}",
+            f"motor minus sensor: {law}, residual {self.residual:.2g} N·m RMS",
+            f"correlation of the shapes: {self.correlation:.3f}",
         ]
 
 
 def sides(records: Mapping[str, Record], inertia: float = 0.0) -> Sides:
-    """Compare ``motor_torque`` with ``sensor_torque`` where the axis slides.
+    """Compare ``motor_torque`` with ``sensor_torque`` while the axis slides.
 
     Parameters
     ----------
     records : mapping of str to Record
         By name; channels ``position`` or ``velocity``, ``motor_torque``, ``sensor_torque``.
     inertia : float
-        kg·m²: its torque is taken from the motor's; 0 for motions at constant velocity.
+        kg·m²: its torque is subtracted from the motor's; 0 for motion at constant velocity.
 
     Raises
     ------
@@ -132,11 +134,11 @@ def sides(records: Mapping[str, Record], inertia: float = 0.0) -> Sides:
 
 
 def _averaged(record: Record, inertia: float) -> Array:
-    """Velocity, motor's and sensor's torque averaged over windows in which the axis moves one way; shape (n, 3)."""
+    """Return velocity, motor and sensor torque, averaged over windows of motion in one direction; shape (n, 3)."""
     v, _ = channel_of(record, "velocity")
     sensor = record["sensor_torque"]
     if not np.any(np.isfinite(sensor)):
-        raise InputError("sides: sensor_torque holds no numbers; give a record of a rig with a torque sensor")
+        raise InputError("sides: sensor_torque has no numbers; give a record of a rig with a torque sensor")
     window = np.floor((record.time - record.time[0]) / WINDOW).astype(np.int64)
     edges = np.flatnonzero(np.diff(window, prepend=-1))
     counts = np.diff(np.append(edges, v.size))
@@ -145,19 +147,19 @@ def _averaged(record: Record, inertia: float) -> Array:
         return np.add.reduceat(x, edges) / counts
 
     speed = mean(v)
-    # Over a window the mean acceleration is the change of velocity from window to window.
+    # The mean acceleration over a window is the change of velocity from window to window.
     motor = mean(record["motor_torque"])
     if speed.size > 1:
         motor = motor - inertia * np.gradient(speed, WINDOW)
     way = np.where(np.abs(speed) > MOVES, np.sign(speed), 0.0)
     beside = np.pad(way, 1)
-    # A window beside a reversal or a stop holds two kinds of motion; the last one may be cut short.
+    # A window next to a reversal or a stop contains two kinds of motion; the last one may be incomplete.
     steady = (way != 0.0) & (beside[:-2] == way) & (beside[2:] == way)
     return np.column_stack([speed, motor, mean(sensor)])[steady]
 
 
 def _fit(v: Array, difference: Array) -> tuple[float, float, float]:
-    """Coulomb, viscous and constant part of the difference, as far as the motion tells them apart."""
+    """Return Coulomb, viscous and constant part of the difference, as far as the motion separates them."""
     columns, places = [np.sign(v)], [0]
     if np.ptp(np.abs(v)) > 0.1 * float(np.max(np.abs(v))):
         columns.append(v)
@@ -173,7 +175,7 @@ def _fit(v: Array, difference: Array) -> tuple[float, float, float]:
 
 
 def _alike(v: Array, motor: Array, sensor: Array) -> float:
-    """Least correlation over the directions; NaN where neither torque changes."""
+    """Return the smallest correlation over the directions; NaN if neither torque changes."""
     found: list[float] = []
     for sign in (1.0, -1.0):
         rows = sign * v > 0.0

@@ -1,8 +1,8 @@
-"""How fast an observer may be: the largest corner with which the sampled loop on a sliding axis is stable, exactly.
+"""The largest corner of an observer with which the sampled loop on a sliding axis is stable, exactly.
 
-The loop is that of the text that runs (`stickslip.analyse.controller_loop`) with the axis as an inertia between two
-samples, its torque held and late by whole samples; it is stable where every eigenvalue lies inside the unit circle. An
-inertia believed too large and a delay are the dangerous sides.
+The loop is linearised from the text that runs (`stickslip.analyse.controller_loop`), with the axis as an inertia whose
+torque is held and delayed by whole samples. It is stable if every eigenvalue is inside the unit circle. Delay and an
+overestimated inertia reduce stability.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from stickslip.machines.drivetrain import Drivetrain
 
 Array = np.ndarray[Any, np.dtype[np.complex128]]
 HIGHEST = 6000.0
-"""1/s, up to which corners are tried."""
+"""Highest corner that is tried, 1/s."""
 LOWEST = 10.0
 STEP = 1.25
-"""Factor between two corners that are tried, before the limit between them is bisected."""
+"""Ratio of successive corners, before the limit between them is found by bisection."""
 DAMPING = 0.3
 """Damping ratio of every pole with the default corner."""
 UNCERTAIN = (0.8, 1.0, 1.25)
-"""Inertia over the nominal one with which the default corner keeps it."""
+"""Ratios of the inertia to the nominal one for which the default corner has this damping."""
 
 
 def poles(controller: Controller, inertia: float, delay: int = 0) -> Array:
-    """Eigenvalues of the loop from sample to sample on a sliding axis without viscous friction.
+    """Return the eigenvalues of the loop from sample to sample on a sliding axis without viscous friction.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def poles(controller: Controller, inertia: float, delay: int = 0) -> Array:
     inertia : float
         Of the axis, kg·m².
     delay : int
-        Samples by which the torque acts late.
+        Delay of the torque, samples.
     """
     drive = linearised(controller, math.inf, 1.0, float(delay))
     found = np.linalg.eigvals(Loop(Drivetrain((inertia,)), drive).matrix())
@@ -48,7 +48,7 @@ def poles(controller: Controller, inertia: float, delay: int = 0) -> Array:
 
 
 def damped(values: Array, damping: float) -> bool:
-    """Whether every pole lies inside the unit circle and has that damping ratio."""
+    """Whether every pole is inside the unit circle and has that damping ratio."""
     sizes = np.abs(values)
     if not float(sizes.max()) < 1.0:
         return False
@@ -59,18 +59,18 @@ def damped(values: Array, damping: float) -> bool:
 def largest_corner(
     made: Callable[[float], Controller], inertia: float, delay: int = 0, damping: float = 0.0
 ) -> float:
-    """The corner, 1/s, below which every loop is stable, to 1; `HIGHEST` where all up to there are, 0 where none is.
+    """Return the corner, 1/s, below which every loop is stable, to within 1; `HIGHEST` if all are stable, 0 if none is.
 
     Parameters
     ----------
     made : callable
-        ``made(corner)``: the controller.
+        ``made(corner)`` returns the controller.
     inertia : float
         Of the axis, kg·m².
     delay : int
-        Samples by which the torque acts late.
+        Delay of the torque, samples.
     damping : float
-        Ratio that every pole shall have besides.
+        Damping ratio that every pole must also have.
     """
 
     def holds(corner: float) -> bool:
@@ -88,10 +88,11 @@ def largest_corner(
 
 
 def default_corner(controller: Controller, delay: int = 0) -> float:
-    """The largest corner, 1/s, of its disturbance observer with which every pole keeps a damping ratio of `DAMPING`.
+    """Return the largest corner of its disturbance observer, 1/s, with which every pole has a damping ratio of
+    `DAMPING`.
 
-    With the nominal inertia off by a quarter up and a fifth down. Where the loop itself has less damping without an
-    observer, half of what is stable.
+    This is tested with the nominal inertia 25 % too high and 20 % too low. If the loop has less damping even without an
+    observer, half of the stable corner is returned.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Whether a LuGre observer (Canudas de Wit et al. 1995) may be switched on: what certifies it, what its guard finds.
+"""Check whether a LuGre observer (Canudas de Wit et al. 1995) may be switched on.
 
-The observer gives the stiffness sigma0 back to an axis that sticks. This positive feedback is stable only below a limit
-near the contact's own stiffness, found exactly from the sampled loop on the stuck axis. Besides, one count of the
-encoder must bend its bristle by less than what slides.
+The observer feeds the stiffness sigma0 back to a sticking axis. This positive feedback is stable only below a limit
+near the contact's own stiffness, which follows exactly from the sampled loop on the sticking axis. In addition, one
+encoder count must be too small to make the bristle slide.
 """
 
 from __future__ import annotations
@@ -22,17 +22,18 @@ from stickslip.machines.drivetrain import Drivetrain, LinearContact
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 CLOSE = 1e-3
-"""Part to which the largest stiffness is found."""
+"""Relative accuracy of the largest stiffness."""
 
 
 @dataclass(frozen=True)
 class Ratios:
-    """What the condition of strict positive realness comes to: each at least 1, and the observer's error decays.
+    """Ratios of the condition of strict positive realness: if each is at least 1, the observer's error decays.
 
     Attributes
     ----------
     velocity : float
-        sigma1 K_v / (sigma0 J): damping of the loop against what the bristle gives back. Infinite for a velocity loop.
+        sigma1 K_v / (sigma0 J): damping of the loop relative to the feedback of the bristle. Infinite for a velocity
+        loop.
     integral : float
         sigma0 K_p / (sigma1 K_i): infinite without an integral.
     """
@@ -42,7 +43,7 @@ class Ratios:
 
     @property
     def certified(self) -> bool:
-        """Whether both are met; where not, nothing is said of the loop, and a simulation decides."""
+        """Whether both are met; otherwise the condition makes no statement, and a simulation decides."""
         return self.velocity >= 1.0 and self.integral >= 1.0
 
     def __str__(self) -> str:
@@ -63,7 +64,7 @@ def positive_real_ratios(
     *,
     position: bool = True,
 ) -> Ratios:
-    """The condition in closed form, Canudas de Wit et al. 1995.
+    """Return the condition in closed form, Canudas de Wit et al. 1995.
 
     Parameters
     ----------
@@ -72,10 +73,10 @@ def positive_real_ratios(
     inertia : float
         kg·m²
     kp, kv, ki : float
-        Of the loop: on the position error, the velocity error and the integral, N·m/rad, N·m·s/rad, N·m/(rad·s); of a
+        Gains of the loop on position error, velocity error and integral, N·m/rad, N·m·s/rad, N·m/(rad·s); for a
         velocity loop ``kp`` and ``ki`` are those of its PI.
     position : bool
-        Whether it is a position loop; a velocity loop has to meet the second ratio alone.
+        Whether it is a position loop; a velocity loop must meet only the second ratio.
     """
     velocity = sigma1 * kv / (sigma0 * inertia) if position else math.inf
     integral = sigma0 * kp / (sigma1 * ki) if sigma1 * ki > 0.0 else math.inf
@@ -85,15 +86,15 @@ def positive_real_ratios(
 def stuck_radius(
     controller: Controller, inertia: float, stiffness: float, damping: float = 0.0, delay: int = 0
 ) -> float:
-    """The largest size of an eigenvalue of the loop on an axis whose contact sticks: stable below 1.
+    """Return the largest magnitude of an eigenvalue of the loop on a sticking axis: stable below 1.
 
     Parameters
     ----------
     controller : Controller
     inertia, stiffness, damping : float
-        Of the axis, kg·m²; of its contact while it sticks, N·m/rad and N·m·s/rad.
+        Of the axis, kg·m²; of its sticking contact, N·m/rad and N·m·s/rad.
     delay : int
-        Samples by which the torque acts late.
+        Delay of the torque, samples.
     """
     drivetrain = Drivetrain((inertia,), contact=LinearContact(stiffness, damping))
     drive = LinearController(about_rest(controller), controller.sample_time, float(delay))
@@ -101,14 +102,15 @@ def stuck_radius(
 
 
 def about_rest(controller: Controller) -> tuple[Array, Array, Array, float]:
-    """The controller about rest, where its bristle is a spring that the velocity winds: A, B, C, D from the angle.
+    """Return A, B, C, D from the angle of the controller about rest, where its bristle is a spring driven by the
+    velocity.
 
-    States: those of everything else, the bristle's deflection, and the angle one sample ago.
+    States: those of the other blocks, the deflection of the bristle, and the angle one sample ago.
     """
     part = part_of(controller)
     if controller.blocks["estimator"].law.name != "backward_difference":
         raise ParameterError(
-            "observer: its guard knows the velocity as a backward difference only; leave estimator out"
+            "observer: its check requires the velocity as a backward difference; leave estimator out"
         )
     p, time = controller.blocks[part].parameters, controller.sample_time
     others = [b for name, b in controller.blocks.items() if b.law.place == "observer" and name != part]
@@ -126,9 +128,9 @@ def about_rest(controller: Controller) -> tuple[Array, Array, Array, float]:
 def largest_stiffness(
     controller: Controller, inertia: float, stiffness: float, damping: float = 0.0, delay: int = 0
 ) -> float:
-    """The sigma0 of its LuGre observer up to which the loop on the stuck axis is stable, N·m/rad.
+    """Return the sigma0 of its LuGre observer up to which the loop on the sticking axis is stable, N·m/rad.
 
-    Parameters as of `stuck_radius`.
+    Parameters as for `stuck_radius`.
 
     Raises
     ------
@@ -151,7 +153,7 @@ def largest_stiffness(
 
 
 def part_of(controller: Controller) -> str:
-    """The name of its LuGre observer's part."""
+    """Return the name of the block with its LuGre observer."""
     for part, block in controller.blocks.items():
         if block.law.name == "lugre_observer":
             return part
@@ -162,7 +164,7 @@ def objection(
     controller: Controller, inertia: float, stiffness: float, counts: float = 0.0, damping: float = 0.0,
     delay: int = 0,
 ) -> str:  # fmt: skip
-    """Why its LuGre observer is not to be switched on, in a sentence, or "".
+    """Return the reason why its LuGre observer must not be switched on, as a sentence, or "".
 
     Parameters
     ----------
@@ -170,7 +172,7 @@ def objection(
     inertia, stiffness, damping, delay
         As of `stuck_radius`.
     counts : float
-        Of the encoder, per revolution; 0: exact.
+        Encoder counts per revolution; 0: exact.
     """
     p: ControlBlock = controller.blocks[part_of(controller)]
     sigma0, gain, fc = p.parameters.sigma0, p.parameters.gain, p.parameters.fc

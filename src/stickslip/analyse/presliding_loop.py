@@ -1,8 +1,8 @@
-"""The loop in pre-sliding as a linear sampled system: plant, drive and compensator; its poles.
+"""The loop in presliding as a linear sampled system of plant, drive and compensator, and its poles.
 
-While every contact sticks, friction is a spring (and a damper) at the place where it acts, and so is the law in a
-feedback compensator, with the opposite sign. The plant is a chain of inertias (thesis figure 4.57) with the motor on
-the first, the contact on the last. Its torque is held for a sample time, and may come late; the drive is that of
+While every contact sticks, friction is a spring (and a damper) at the contact, and so is the law in a feedback
+compensator, with the opposite sign. The plant is a chain of inertias (thesis figure 4.57) with the motor on the first
+and the contact on the last. Its torque is held for a sample time and may be delayed; the drive is that of
 `stickslip.control.composition`, linearised about rest.
 """
 
@@ -24,18 +24,18 @@ from stickslip.simulation.prescribed.motion import Samples, packed_numbers, torq
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 STEPS = 64
-"""Of a period, in the describing function of a law."""
+"""Steps per period for the describing function of a law."""
 STABLE = 1e-9
-"""By which a pole may lie outside the unit circle, by rounding."""
+"""Tolerance of the unit circle for rounding errors of a pole."""
 TURNS = np.geomspace(1e-5 * math.pi, math.pi, 500)
-"""Frequencies up to half the sample rate at which a loop's sensitivity and crossover are looked for, rad a sample."""
+"""Frequencies up to half the sample rate for a loop's sensitivity and crossover, rad per sample."""
 
 
 def describing(model: Model, amplitude: float, frequency: float) -> LinearContact:
-    """A law's first harmonic along a sinusoid about rest: its describing function.
+    """Return a law's describing function: its first harmonic along a sinusoid about rest.
 
-    It is what the law's own `step` answers in the second period, so it holds for every law: a contact that sticks is a
-    spring, one that begins to slip a softer spring with damping, Coulomb friction a damper of 4 F_C / (pi amplitude w).
+    It is computed from the law's own `step` in the second period, so it is valid for every law: a sticking contact is a
+    spring, one that starts to slip a softer spring with damping, Coulomb friction a damper of 4 F_C / (pi amplitude w).
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def describing(model: Model, amplitude: float, frequency: float) -> LinearContac
         if not (value > 0.0 and math.isfinite(value)):
             raise ParameterError(f"stability: {name} = {value:g} {unit} must be greater than 0 and finite")
     w = 2.0 * math.pi * frequency
-    # Half-way between zeros of the velocity: a law that jumps there is taken on either side.
+    # Half-way between zeros of the velocity, where laws may jump.
     steps = np.arange(-1, 2 * STEPS)
     speeds = amplitude * w * np.cos(2.0 * math.pi * (steps + 0.5) / STEPS)
     times = (steps + 1.0) / (STEPS * frequency)
@@ -58,11 +58,13 @@ def describing(model: Model, amplitude: float, frequency: float) -> LinearContac
     angle = 2.0 * math.pi * (np.arange(STEPS) + 0.5) / STEPS
     in_phase, in_step = float(torque @ np.sin(angle)), float(torque @ np.cos(angle))
     scale = 2.0 / (STEPS * amplitude)
-    return LinearContact(max(scale * in_phase, 0.0), scale * in_step / w)  # a jump's phase is only rounded
+    return LinearContact(
+        max(scale * in_phase, 0.0), scale * in_step / w
+    )  # the phase of a jump is only rounded
 
 
 class Sampled(Protocol):
-    """What a loop needs of a controller."""
+    """The interface of a controller for a loop."""
 
     @property
     def sample_time(self) -> float:
@@ -71,11 +73,11 @@ class Sampled(Protocol):
 
     @property
     def delay(self) -> float:
-        """By how much of a sample time, or of several, the torque comes late."""
+        """Delay of the torque, in samples; may be fractional."""
         ...
 
     def state_space(self) -> tuple[Array, Array, Array, float]:
-        """A, B, C, D from measured angle to torque."""
+        """Return A, B, C, D from measured angle to torque."""
         ...
 
 
@@ -87,15 +89,15 @@ class Drive:
     ----------
     gains : Gains
     law : LinearContact
-        What the feedback compensator runs on, while it sticks.
+        Law of the feedback compensator, while it sticks.
     gain : float
         Factor on the compensating torque.
     filter_hz : float
-        Corner of the second-order Butterworth low-pass on what the compensator sees; 0 for none.
+        Corner of the second-order Butterworth low-pass at the compensator's input; 0 for none.
     sample_time : float
         s
     delay : float
-        By how much of a sample time, or of several, the torque comes late.
+        Delay of the torque, in samples; may be fractional.
     """
 
     gains: Gains
@@ -114,10 +116,10 @@ class Drive:
             raise ParameterError(f"stability: delay = {self.delay:g} samples must be from 0 to 100")
 
     def state_space(self) -> tuple[Array, Array, Array, float]:
-        """A, B, C, D from measured angle to torque.
+        """Return A, B, C, D from measured angle to torque.
 
-        States: the last angle, the integral of the error where there is a gain on it, and with a filter its input two
-        samples ago and its last two outputs. The filter acts on the angle, which is the same as on its difference.
+        States: the last angle, the integral of the error if it has a gain, and with a filter its input two samples ago
+        and its last two outputs. The filter acts on the angle, which is equivalent to its difference.
         """
         t, g = self.sample_time, self.gains
         integral, filtered = g.ki > 0.0, self.filter_hz > 0.0
@@ -149,7 +151,7 @@ class Drive:
         return a, b, c, d + now * forward
 
     def _filter(self) -> tuple[float, float, float]:
-        """Weights of the low-pass, as `stickslip.control.laws._seen` has them."""
+        """Return the weights of the low-pass, as in `stickslip.control.laws._seen`."""
         g = math.tan(min(math.pi * self.filter_hz * self.sample_time, 0.495 * math.pi))
         scale = 1.0 / (1.0 + math.sqrt(2.0) * g + g * g)
         return g * g * scale, 2.0 * (g * g - 1.0) * scale, (1.0 - math.sqrt(2.0) * g + g * g) * scale
@@ -162,7 +164,7 @@ class Poles:
     Attributes
     ----------
     radius : float
-        Its distance from 0; below 1 the loop is stable.
+        Magnitude; below 1 the loop is stable.
     growth : float
         ln(radius) / sample time, 1/s.
     frequency : float
@@ -175,13 +177,14 @@ class Poles:
 
     @property
     def stable(self) -> bool:
-        """Whether a small motion dies out."""
+        """Whether a small motion decays."""
         return self.radius < 1.0
 
 
 @lru_cache(maxsize=512)
 def held(drivetrain: Drivetrain, sample_time: float, late: float) -> tuple[Array, Array, Array, Array]:
-    """From sample to sample: A, B of the new torque, which acts from `late` samples on, B of the one before, C."""
+    """Return the matrices from sample to sample: A, B of the new torque, which acts after `late` samples, B of the
+    previous one, C."""
     system, command = drivetrain.state_space(), INPUTS.index("command")
     first, then = system.over(sample_time * late), system.over(sample_time * (1.0 - late))
     into, before = then.held[:, [command]], first.held[:, [command]]
@@ -190,14 +193,14 @@ def held(drivetrain: Drivetrain, sample_time: float, late: float) -> tuple[Array
 
 @dataclass(frozen=True)
 class Loop:
-    """A drivetrain under a drive.
+    """A drivetrain with a drive.
 
     Attributes
     ----------
     drivetrain : Drivetrain
     drive : Drive, or another `Sampled`
     measured : float
-        Factor on the measured angle: 1, or what a quantiser's describing function makes of it.
+        Factor on the measured angle: 1, or that of a quantiser's describing function.
     """
 
     drivetrain: Drivetrain
@@ -205,19 +208,19 @@ class Loop:
     measured: float = 1.0
 
     def matrix(self) -> Array:
-        """The closed loop from sample to sample."""
+        """Return the matrix of the closed loop from sample to sample."""
         whole = math.floor(self.drive.delay)
         part = self.drive.delay - whole
         ad, new, old, c = held(self.drivetrain, self.drive.sample_time, part)
         ac, bc, cc, dc = self.drive.state_space()
         c = self.measured * c
         n, m = ad.shape[0], ac.shape[0]
-        late = whole + (part > 0.0)  # torques that are remembered
+        late = whole + (part > 0.0)  # delayed torques
         out = np.zeros((n + m + late, n + m + late))
         out[:n, :n] = ad
         out[n : n + m, :n], out[n : n + m, n : n + m] = bc @ c, ac
         torque = np.hstack([dc * c, cc, np.zeros((1, late))])
-        # Torques, newest first: this sample's, then those remembered.
+        # Torques, newest first: this sample's, then the delayed ones.
         torques = np.vstack([torque, np.eye(n + m + late)[n + m :]])
         out[:n] += new @ torques[whole : whole + 1]
         if part > 0.0:
@@ -226,22 +229,21 @@ class Loop:
         return out
 
     def sensitivity(self) -> float:
-        """Greatest magnitude of 1 / (1 + L), L being the loop's transfer function cut open; infinite where the closed
-        loop is unstable.
+        """Return the largest magnitude of 1 / (1 + L) with the open-loop transfer function L; infinite if unstable.
 
-        Loops as people set them have 1.2 to 2 (Åström and Hägglund, Advanced PID Control, 2006).
+        Usual loops have 1.2 to 2 (Åström and Hägglund, Advanced PID Control, 2006).
         """
         closed, opened = self.matrix(), replace(self, measured=0.0).matrix()
         if np.abs(np.linalg.eigvals(closed)).max() > 1.0 + STABLE:
             return math.inf
-        # Both differ by what the measured angle feeds: det(z - closed) / det(z - opened) = 1 + L.
+        # Closed and open loop differ by the measured angle: det(z - closed) / det(z - opened) = 1 + L.
         z = np.exp(1j * TURNS)[:, None, None] * np.eye(len(closed))
         _, size = np.linalg.slogdet(z - closed)
         _, alone = np.linalg.slogdet(z - opened)
         return float(np.exp(np.max(alone - size)))
 
     def opened(self, turns: Array) -> Any:
-        """The loop's transfer function L cut open, at angles in rad a sample, complex."""
+        """Return the open-loop transfer function L at angles in rad per sample, complex."""
         closed, opened = self.matrix(), replace(self, measured=0.0).matrix()
         z = np.exp(1j * turns)[:, None, None] * np.eye(len(closed))
         sign, size = np.linalg.slogdet(z - closed)
@@ -249,8 +251,7 @@ class Loop:
         return sign / sign_alone * np.exp(size - alone) - 1.0
 
     def phase_margin(self) -> tuple[float, float]:
-        """The least angle between L and -1 where its magnitude is 1, degrees, and the frequency there, Hz; infinite
-        and NaN where it nowhere is."""
+        """Return the phase margin, degrees, and the crossover frequency, Hz; infinite and NaN without crossover."""
         size = np.log(np.abs(self.opened(TURNS)))
         crossed = np.flatnonzero(size[:-1] * size[1:] < 0.0)
         if not crossed.size:
@@ -266,7 +267,7 @@ class Loop:
         return float(left[least]), float(low[least]) / (2.0 * math.pi * self.drive.sample_time)
 
     def poles(self) -> Poles:
-        """The least stable pole."""
+        """Return the least stable pole."""
         found = np.linalg.eigvals(self.matrix())
         worst = found[np.argmax(np.abs(found))]
         radius, t = float(np.abs(worst)), self.drive.sample_time
@@ -285,14 +286,14 @@ class Axis:
 
     @property
     def ringing(self) -> float:
-        """Frequency of the whole inertia on the contact that the encoder sees, Hz."""
+        """Frequency of the whole inertia on the contact stiffness at the encoder, Hz."""
         stiff = self.at(self.amplitude, 100.0).visible
         return math.sqrt(max(stiff, 1e-9) / math.fsum(self.drivetrain.inertias)) / (2.0 * math.pi)
 
     def at(self, amplitude: float, frequency: float) -> Drivetrain:
-        """The drivetrain with its contact as it is at that amplitude of the encoder (rad) and frequency (Hz)."""
+        """Return the drivetrain with its contact at an amplitude of the encoder (rad) and a frequency (Hz)."""
         out = self.drivetrain
-        # How far the contact moves depends on its stiffness, and that on how far it moves.
+        # The amplitude at the contact depends on its stiffness, and that on the amplitude.
         for _ in range(3):
             moved = amplitude * (out.reach if out.contact.stiffness > 0.0 else 1.0)
             out = replace(self.drivetrain, contact=describing(self.friction, moved, frequency))

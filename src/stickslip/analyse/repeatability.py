@@ -1,4 +1,5 @@
-"""How much repeated runs of each controller differ, at every time and over all; thesis 4.4, figures 4.52 to 4.56."""
+"""Differences between repeated runs of each controller, at every time and in total; thesis 4.4, figures 4.52 to
+4.56."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 @dataclass(frozen=True, eq=False)
 class Repeated:
-    """Runs of one controller laid over each other.
+    """Superposed runs of one controller.
 
     Attributes
     ----------
@@ -31,7 +32,7 @@ class Repeated:
     starts : array, shape (m,)
         The positions at which the references start; zeros without a reference and for other channels.
     mean, spread, low, high : array, shape (n,)
-        Over the runs, at every time: mean, standard deviation (of a sample of m), least, greatest.
+        Over the runs, at every time: mean, standard deviation (of a sample of m), minimum, maximum.
     """
 
     name: str
@@ -47,30 +48,30 @@ class Repeated:
 
     @property
     def rms_spread(self) -> float:
-        """Root of the mean over time of the squared standard deviation."""
+        """RMS over time of the standard deviation."""
         return math.sqrt(float(np.mean(self.spread**2)))
 
     @property
     def greatest_range(self) -> float:
-        """Greatest distance of two runs at one time."""
+        """Largest difference of two runs at one time."""
         return float(np.max(self.high - self.low))
 
     @property
     def relative(self) -> float:
-        """`rms_spread` over half the peak-to-peak of the mean; infinite where the mean does not move."""
+        """`rms_spread` relative to half the peak-to-peak value of the mean; infinite if the mean is constant."""
         half = 0.5 * float(np.ptp(self.mean))
         return self.rms_spread / half if half > 0.0 else math.inf
 
     @property
     def alikeness(self) -> float:
-        """Least correlation of two runs: 1 where all have the same shape."""
+        """Smallest correlation of two runs: 1 if all have the same shape."""
         moving = [run for run in self.runs if np.ptp(run) > 0.0]
         if len(moving) < 2:
             return math.nan
         return min(float(np.corrcoef(a, b)[0, 1]) for a, b in combinations(moving, 2))
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data, without the curves."""
+        """Return plain data, without the curves."""
         return {
             "controller": self.name, "channel": self.channel, "unit": self.unit, "runs": len(self.runs),
             "rms_spread": self.rms_spread, "greatest_range": self.greatest_range, "relative": self.relative,
@@ -78,33 +79,31 @@ class Repeated:
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """What people read."""
+        """Return the lines of the report."""
         apart = float(np.ptp(self.starts))
-        starts = (
-            f"; each from its own start, and these lie within {apart:.3g} {self.unit}" if apart > 0.0 else ""
-        )
+        starts = f"; each from its own start, which differ by {apart:.3g} {self.unit}" if apart > 0.0 else ""
         return [
             f"{self.name}: {len(self.runs)} runs, {self.channel}: spread {self.rms_spread:.3g} {self.unit} RMS "
-            f"({100 * self.relative:.3g} % of the amplitude), greatest range {self.greatest_range:.3g} {self.unit}, "
-            f"least correlation {self.alikeness:.4f}{starts}"
+            f"({100 * self.relative:.3g} % of the amplitude), largest range {self.greatest_range:.3g} {self.unit}, "
+            f"smallest correlation {self.alikeness:.4f}{starts}"
         ]
 
 
 def repeatability(groups: Mapping[str, Sequence[Record]], channel: str = "position") -> list[Repeated]:
-    """Lay the runs of every controller over each other.
+    """Superpose the runs of every controller.
 
     Parameters
     ----------
     groups : mapping of str to sequence of Record
         Runs of the same motion, by controller; at least two each. Times count from the start of each run, positions
-        from the start of its reference, if there is one. The length that the runs have in common is compared.
+        from the start of its reference, if there is one. The common length of the runs is compared.
     channel : str
         As for `stickslip.analyse.spectrum.spectrum`.
 
     Raises
     ------
     InputError
-        If a controller has one run only, or a record lacks the channel.
+        If a controller has only one run, or a record lacks the channel.
     """
     return [_repeated(name, records, channel) for name, records in groups.items()]
 

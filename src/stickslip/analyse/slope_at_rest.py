@@ -1,7 +1,7 @@
-"""The slope at rest of a sample of a controller: what it makes of a small change, by that change; or why there is none.
+"""The slope at rest of a sample of a controller: its response to a small change, divided by that change.
 
-A law may be smooth and bend at once: a torque of |s|^1.5 has the slope 0 at rest, and another one for any change. Its
-slopes approach that of rest as the change shrinks; those of a sign, a root or a kink do not.
+A smooth law may bend immediately: a torque of |s|^1.5 has slope 0 at rest, and another slope for any change. Its slopes
+converge as the change decreases; those of a sign, a root or a kink do not.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from stickslip.messages import name_command
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 SIZES = (1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
-"""Changes of a number by which the matrices are found, in its unit, the largest first: a law may be smooth and bend
-within 1e-6 rad a sample. What bends within the smallest one too is a sign for every drive."""
+"""Changes of a state for finding the matrices, in its unit, in descending order: a smooth law may bend within 1e-6 rad
+per sample. A law that bends within the smallest one is a sign function for every drive."""
 BENT = 1e-4
-"""Part by which answers to changes of other sizes may differ where a law is linear about rest."""
+"""Relative difference of the slopes for changes of different sizes if a law is linear about rest."""
 DEAD = 1e-6
-"""Part of its slope for larger changes below which a law does not answer smaller ones."""
+"""Share of the slope for larger changes below which a law does not respond to smaller ones."""
 SHRINKS = 0.6
-"""By which slopes for changes a tenth as large come nearer at least, where they approach the one at rest: |s|^1.25."""
+"""Smallest convergence of slopes per tenfold smaller change: that of |s|^1.25."""
 UNSURE = 0.1
-"""Of the last of these ways, by which slopes at rest of both directions may differ."""
+"""Allowed difference of the slopes at rest in both directions, relative to the last change of the slopes."""
 SIMULATE = f"or simulate it ({name_command('simulate')}, `stickslip rig run track`)"
 
 
 def slope_at_rest(run: Sample, row: Array) -> Array:
-    """What a sample makes of a small change of one number, by that change.
+    """Return the response of a sample to a small change of one state, divided by that change.
 
     Raises
     ------
     InputError
-        If the law is bent there, or dead.
+        If the law is not smooth there, or has a dead band.
     """
     for size in SIZES:
         ahead, back, further = (run.answers(h * row) / h for h in (size, -size, 10.0 * size))
@@ -52,15 +52,15 @@ def slope_at_rest(run: Sample, row: Array) -> Array:
 
 
 class Limit(NamedTuple):
-    """A slope that those of smaller and smaller changes approach, and how far the last two of them are apart."""
+    """Limit of the slopes for decreasing changes, and the difference of the last two."""
 
     slope: Array
     last: float
 
 
 def approached(slopes: Array) -> Limit | None:
-    """What slopes for changes each a tenth of the one before approach, None where they do not; shape (sizes, n)."""
-    # A boundary layer may end among the largest changes.
+    """Return the limit of slopes for changes that decrease tenfold, None if they do not converge; shape (sizes, n)."""
+    # A boundary layer may end within the largest changes.
     steps = np.diff(slopes, axis=0)[-3:]
     ways = np.abs(steps).max(axis=1)
     if not np.all(ways[1:] <= SHRINKS * ways[:-1]):
@@ -78,7 +78,7 @@ def _apart(ahead: Limit, back: Limit) -> bool:
 
 
 def _bent(run: Sample, row: Array, ahead: Array, back: Array) -> str:
-    """What is not smooth, where, and how it could be, in words; slopes as of `SIZES`, shape (sizes, n)."""
+    """Return the error that names what is not smooth, and a remedy; slopes for `SIZES`, shape (sizes, n)."""
     off = np.maximum(np.abs(ahead[-1] - back[-1]), np.abs(ahead[-1] - ahead[-2]))
     place = run.telling(off > BENT * max(float(np.abs(ahead[-1]).max()), 1.0))
     before, now, behind = (float(one[place]) for one in (ahead[-2], ahead[-1], back[-1]))
@@ -95,7 +95,7 @@ def _bent(run: Sample, row: Array, ahead: Array, back: Array) -> str:
 
 
 def _refuse_dead_band(run: Sample, row: Array, found: Array, size: float) -> None:
-    """`InputError` where no answer to changes of one size becomes an answer to larger ones: that loop stands still."""
+    """Raise `InputError` if the law responds to large changes but not to small ones: such a loop stands still."""
     for larger in (one for one in (10.0 * SIZES[0], *SIZES) if one > size):
         slope = 0.5 * (run.answers(larger * row) - run.answers(-larger * row)) / larger
         most = max(float(np.abs(slope).max()), 1.0)

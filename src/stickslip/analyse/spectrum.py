@@ -1,4 +1,4 @@
-"""Power spectral density of a run that oscillates, its peaks, the modes they excite; thesis 4.5, figures 4.58, 4.59.
+"""Power spectral density of an oscillating run, its peaks and the excited modes; thesis 4.5, figures 4.58, 4.59.
 
 Welch's estimate: Hann windows that overlap by half, means removed, one-sided, so that its integral over frequency is
 the variance of the signal.
@@ -20,11 +20,11 @@ from stickslip.record import Record
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SEGMENTS = 8
-"""Windows over a record whose resolution is not given."""
+"""Default number of windows over a record."""
 PROMINENCE = 10.0
-"""dB by which a peak rises above its surroundings: noise averaged over 8 windows does not."""
+"""Smallest prominence of a peak, dB: noise averaged over 8 windows stays below."""
 NEAR = 0.12
-"""Share of its frequency by which a peak may miss a mode and still be named after it."""
+"""Largest relative distance between a peak and the mode named for it."""
 FEWEST = 64
 MOST = 100_000_000
 
@@ -42,7 +42,7 @@ class Peak:
     share : float
         Of the signal's variance.
     mode : str
-        Name of the mode it excites; empty where none is near.
+        Name of the excited mode; empty if none is near.
     """
 
     frequency: float
@@ -68,7 +68,7 @@ class Spectrum:
     peaks : tuple of Peak
         The strongest first.
     modes : mapping of str to float
-        The modes that peaks were compared with, Hz, as seen at this sample rate.
+        Modes for comparison, Hz, as they appear at this sample rate.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Spectrum:
     modes: Mapping[str, float]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data, without the curve."""
+        """Return plain data, without the curve."""
         return {
             "record": self.name, "channel": self.channel, "unit": self.unit, "rms": self.rms,
             "sample_rate": self.sample_rate, "resolution": float(self.frequency[1]), "modes": dict(self.modes),
@@ -90,7 +90,7 @@ class Spectrum:
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """What people read."""
+        """Return the lines of the report."""
         head = (
             f"{self.name}: {self.channel}, RMS {self.rms:.4g} {self.unit} about its mean, "
             f"{self.sample_rate:g} samples/s, resolution {self.frequency[1]:.3g} Hz"
@@ -106,18 +106,18 @@ class Spectrum:
 
 
 def channel_of(record: Record, channel: str) -> tuple[Array, str]:
-    """A channel's values and unit; ``position_error`` and ``velocity`` are made from others where they are missing."""
+    """Return a channel's values and unit; missing ``position_error`` and ``velocity`` are computed from others."""
     if channel in record.channels:
         return record[channel], record.units[channel]
     if channel == "position_error" and "position_reference" in record.channels:
         return record["position_reference"] - record["position"], record.units["position"]
     if channel == "velocity" and "position" in record.channels:
         return np.gradient(record["position"], record.time), f"{record.units['position']}/s"
-    return record[channel], ""  # raises, and says what there is
+    return record[channel], ""  # raises, and lists the channels
 
 
 def evenly(record: Record, values: Array) -> tuple[Array, Array]:
-    """The signal on even times, of the record's own median spacing: times and values.
+    """Return times and values of the signal on an even grid with the median spacing of the record.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def evenly(record: Record, values: Array) -> tuple[Array, Array]:
     time, values = time[good], values[first][good]
     if time.size < FEWEST:
         raise InputError(f"spectrum: {time.size} samples are too few; give at least {FEWEST}")
-    # Rows at events lie between those of the grid: the usual spacing is the longest common one.
+    # Rows at events are between those of the grid: the usual spacing is the longest common one.
     spacing = float(np.quantile(np.diff(time), 0.9))
     with np.errstate(over="ignore"):
         count = float((time[-1] - time[0]) / spacing * (1.0 + 1e-9))
@@ -145,7 +145,7 @@ def evenly(record: Record, values: Array) -> tuple[Array, Array]:
 
 
 def seen_at(frequency: float, rate: float) -> float:
-    """Where a frequency appears when it is sampled at `rate`, Hz."""
+    """Return the apparent frequency of a signal that is sampled at `rate`, Hz."""
     folded = math.fmod(frequency, rate)
     return min(folded, rate - folded)
 
@@ -160,7 +160,7 @@ def spectrum(
     end: float = math.inf,
     name: str = "",
 ) -> Spectrum:
-    """Power spectral density of a channel of a record.
+    """Return the power spectral density of a channel of a record.
 
     Parameters
     ----------
@@ -168,11 +168,11 @@ def spectrum(
     channel : str
         A channel of the record; ``position_error`` is position_reference - position.
     modes : mapping of str to float, optional
-        Known modes by name, Hz. One above half the sample rate is looked for where it folds to.
+        Known modes by name, Hz. One above half the sample rate is searched at its alias.
     resolution : float, optional
-        Hz; a window is 1/resolution long. Without it the record is cut into 8 windows' lengths.
+        Hz; a window is 1/resolution long. Default: 8 windows over the record.
     start, end : float
-        s: the part of the record that counts.
+        s: the part of the record to use.
     name : str
         Of the record.
 
@@ -201,12 +201,12 @@ def spectrum(
 
 
 def _peaks(frequency: Array, density: Array, variance: float, modes: Mapping[str, float]) -> tuple[Peak, ...]:
-    """The peaks, strongest first, and the modes they lie at."""
+    """Return the peaks, strongest first, with their modes."""
     if variance <= 0.0 or not np.any(density > 0.0):
         return ()
     signal: Any = importlib.import_module("scipy.signal")
     level = 10.0 * np.log10(np.maximum(density, 1e-12 * density.max()))
-    # The first bins hold the motion itself and what is left of the mean.
+    # The first bins contain the motion itself and the remainder of the mean.
     places, about = signal.find_peaks(level[2:], prominence=PROMINENCE)
     out: list[Peak] = []
     for place, left, right in zip(places + 2, about["left_bases"] + 2, about["right_bases"] + 2, strict=True):
@@ -218,7 +218,7 @@ def _peaks(frequency: Array, density: Array, variance: float, modes: Mapping[str
 
 
 def _foot(level: Array, place: int, base: int, step: int) -> int:
-    """Where a peak ends on one side: 20 dB below it, or its base."""
+    """Return the end of a peak on one side: 20 dB below it, or its base."""
     i = place
     while i != base and level[i] > level[place] - 20.0:
         i += step
@@ -226,7 +226,7 @@ def _foot(level: Array, place: int, base: int, step: int) -> int:
 
 
 def _nearest(frequency: float, modes: Mapping[str, float]) -> str:
-    """The mode nearest to a peak, if near enough."""
+    """Return the mode nearest to a peak, if near enough."""
     if not modes:
         return ""
     name = min(modes, key=lambda m: abs(modes[m] - frequency))

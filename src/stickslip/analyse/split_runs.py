@@ -1,4 +1,4 @@
-"""A procedure's record as the runs that it holds: one per velocity and direction, or one per repetition."""
+"""Split a procedure's record into runs: one per velocity and direction, or one per repetition."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from stickslip.record import Record
 
 SAME = 1e-6
-"""Relative change of the reference velocity from which another run begins."""
+"""Relative change of the reference velocity that starts another run."""
 GAP = 50.0
-"""Usual distances between two rows, from which one is a pause."""
+"""Multiple of the usual time step that counts as a pause."""
 FEWEST = 20
-"""Rows of a run."""
+"""Fewest rows of a run."""
 
 
 def pieces(name: str, record: Record) -> list[tuple[str, Record]]:
-    """The runs of a record that `stickslip rig run` made, by name; of any other record the record itself.
+    """Return the runs of a record of `stickslip rig run`, by name; for any other record the record itself.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def pieces(name: str, record: Record) -> list[tuple[str, Record]]:
 
 
 def rows_of(record: Record, rows: np.ndarray[Any, np.dtype[np.intp]]) -> Record:
-    """Some rows of a record, whatever it holds besides."""
+    """Return some rows of a record with all its channels."""
     meta = {k: v for k, v in record.meta.items() if k != "procedure"}
     channels = {n: values[rows] for n, values in record.channels.items()}
     return Record(record.time[rows], channels, record.units, meta)

@@ -1,17 +1,17 @@
 """Why feedback compensation oscillates: the sampled loop about rest; the question of thesis 5.2.
 
 While everything sticks the contact is a spring, and a feedback compensator with a dynamic law is the same spring with
-the opposite sign, read through the encoder, half a sample late and held. What is left of the stiffness is
+the opposite sign, measured by the encoder, delayed by half a sample and held. The remaining stiffness is
 
     contact + k_p - gain x compensator,
 
-so its gain has the static margin (contact + k_p) / compensator: little more than 1 on a stiff contact, and as little of
-the contact may be missing. At the loop's own frequencies the delayed spring is a damper of either sign, which a filter
-takes away. What a law takes by viscosity or by a jump at v = 0, its compensation gives back as negative damping.
+so its gain has the static margin (contact + k_p) / compensator: only slightly above 1 on a stiff contact, so the loop
+tolerates only a small loss of contact stiffness. At the loop's own frequencies the delayed spring is a damper of either
+sign, which a filter removes. The viscous part of a law, or its jump at v = 0, becomes negative damping by compensation.
 
-Laws enter by their describing functions (first harmonic balance): for small motion of a given amplitude the loop is
-linear, and where its growth passes through zero as the amplitude rises, it cycles. An encoder's counts are a factor
-between 0 and 4/pi on motions of their size.
+Laws are represented by their describing functions (first harmonic balance): for small motion of a given amplitude the
+loop is linear. It has a limit cycle at the amplitude at which its growth is zero. Quantisation by the encoder is a
+factor between 0 and 4/pi for motion of a few counts.
 """
 
 from __future__ import annotations
@@ -47,16 +47,17 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 COUNTED = 4.0 / math.pi
 """Largest value of a quantiser's describing function."""
 AMPLITUDES = np.geomspace(1.0, 4096.0, 17)
-"""Amplitudes at which cycles are looked for, over the smallest one."""
+"""Amplitudes for the search of limit cycles, relative to the smallest one."""
 TRIED_GAINS = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.6, 0.5)
 TRIED_FILTERS = (0.0, 200.0, 150.0, 100.0, 70.0, 50.0, 35.0, 25.0, 20.0, 15.0, 10.0, 7.0, 5.0, 3.0, 2.0)
 RESERVE = 1.25
-"""Factor on the recommended gain up to which the dynamics must stay stable."""
+"""Factor on the recommended gain up to which the loop must be stable."""
 SOFTER = (1.0, 0.95, 0.9, 0.85, 0.8)
-"""Shares of the contact at which the recommended setting must stay stable: friction varies by 20 % over a revolution
+"""Shares of the contact stiffness with which the recommended setting must be stable: friction varies by 20 % over a
+revolution
 (thesis 3.2.2.3)."""
 SLOW = 5.0
-"""Hz: an instability below it creeps, it does not ring."""
+"""Hz: a slower instability creeps instead of ringing."""
 
 
 # ---- one loop ------------------------------------------------------------------------------------------------------
@@ -68,7 +69,7 @@ def stable(drivetrain: Drivetrain, drive: Sampled, measured: float = 1.0) -> boo
 
 
 def edge(good: Callable[[float], bool], points: Array) -> float:
-    """The end of the stretch from the first point on in which `good` holds; NaN if not even there."""
+    """Return the end of the interval from the first point in which `good` is true; NaN if it is false at the first."""
     if not good(float(points[0])):
         return math.nan
     for low, high in pairwise(points):
@@ -82,8 +83,8 @@ def edge(good: Callable[[float], bool], points: Array) -> float:
 
 
 def gain_margin(drivetrain: Drivetrain, drive: Drive, law: LinearContact) -> float:
-    """The loop is stable for all gains from 0 to this, at most `MOST_GAIN`; NaN where it is unstable without any."""
-    # Steep laws go unstable at tiny gains: the first points are close together.
+    """Return the gain up to which the loop is stable from 0 on, at most `MOST_GAIN`; NaN if it is unstable at 0."""
+    # Steep laws become unstable at tiny gains, so the first points are close together.
     points = np.concatenate([[0.0], np.geomspace(1e-4, 0.1, 10), np.linspace(0.2, MOST_GAIN, 29)])
     return edge(lambda g: stable(drivetrain, replace(drive, law=law, gain=g)), points)
 
@@ -100,7 +101,7 @@ def _linear_limit(drivetrain: Drivetrain, drive: Drive) -> float:
 def with_law(
     axis: Axis, drive: Drive, model: Model | None, amplitude: float, frequency: float
 ) -> tuple[Drivetrain, Drive]:
-    """Drivetrain and drive at an amplitude of the encoder; the compensator sees what its filter leaves of it."""
+    """Return drivetrain and drive at an amplitude of the encoder; the compensator's input is filtered."""
     drivetrain = axis.at(amplitude, frequency)
     if model is None:
         return drivetrain, replace(drive, law=FREE, filter_hz=0.0)
@@ -111,7 +112,7 @@ def with_law(
 
 
 def _poles(axis: Axis, drive: Drive, model: Model | None, amplitude: float) -> Poles:
-    """Least stable pole at an amplitude, with the laws as they are at its own frequency."""
+    """Return the least stable pole at an amplitude, with the laws at its own frequency."""
     found = Loop(*with_law(axis, drive, model, amplitude, axis.ringing)).poles()
     for _ in range(2):
         if found.frequency < SLOW:
@@ -121,7 +122,7 @@ def _poles(axis: Axis, drive: Drive, model: Model | None, amplitude: float) -> P
 
 
 def _cycle(axis: Axis, drive: Drive, model: Model | None, first: Poles) -> Cycle | None:
-    """Where the growth of an unstable loop ends as its amplitude rises."""
+    """Return the limit cycle of an unstable loop."""
     if first.stable:
         return None
     low = axis.amplitude
@@ -156,10 +157,10 @@ def _margins(name: str, axis: Axis, drive: Drive, model: Model | None) -> Margin
 
 
 def _recommended(name: str, axis: Axis, drive: Drive, model: Model) -> SafeGain | None:
-    """The highest gain, and for it the highest filter, that keep the margins.
+    """Return the highest gain, and for it the highest filter corner, that keep the margins.
 
-    The loop must be stable at the small amplitude with `RESERVE` times the gain (as far as the stiffness allows it),
-    with the contact down to 80 %, and at all factors that an encoder's counts may make.
+    The loop must be stable at the small amplitude with `RESERVE` times the gain (as far as the stiffness allows), with
+    80 % of the contact stiffness, and for all factors of the encoder's quantisation.
     """
     for gain in TRIED_GAINS:
         for corner in (f for f in TRIED_FILTERS if f <= highest_corner(drive.sample_time)):
@@ -175,7 +176,7 @@ def _recommended(name: str, axis: Axis, drive: Drive, model: Model) -> SafeGain 
 def _safe(drivetrain: Drivetrain, setting: Drive) -> bool:
     if not all(stable(drivetrain.softer(share), setting) for share in SOFTER):
         return False
-    # Without stiffness left the loop creeps away whatever the filter: the reserve of the gain goes no further.
+    # Without remaining stiffness the loop creeps away with any filter, so the reserve of the gain ends there.
     static = (drivetrain.visible + setting.gains.kp) / max(setting.law.stiffness, 1e-9)
     more = replace(setting, gain=min(RESERVE * setting.gain, 0.999 * static))
     return stable(drivetrain, more) and all(
@@ -189,7 +190,7 @@ def _safe(drivetrain: Drivetrain, setting: Drive) -> bool:
 def stability(
     axis: Axis, drive: Drive, models: Mapping[str, Model], filters: Sequence[float] = (0.0, 10.0)
 ) -> Stability:
-    """Margins of feedback compensators, maps of them, and a recommendation.
+    """Return margins of feedback compensators, maps of them, and a recommendation.
 
     Parameters
     ----------
@@ -197,9 +198,9 @@ def stability(
     drive : Drive
         Linear controller, sample time and delay.
     models : mapping of str to Model
-        What the compensators believe, by name.
+        Models of the compensators, by name.
     filters : sequence of float
-        Corners to report, Hz; 0 for none.
+        Filter corners to report, Hz; 0 for none.
 
     Raises
     ------

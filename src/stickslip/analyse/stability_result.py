@@ -1,4 +1,4 @@
-"""What `stickslip.analyse.stability` returns, and how people read it."""
+"""The result of `stickslip.analyse.stability`, and its report."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 MOST_GAIN = 3.0
 TIMES = np.geomspace(1e-4, 4e-3, 33)
-"""s, of the map over sample times."""
+"""Sample times of the map, s."""
 FILTERS = np.geomspace(2.0, 300.0, 33)
-"""Hz, of the map over filters."""
+"""Filter corners of the map, Hz."""
 GAINS = np.linspace(0.0, 1.5, 31)
-"""Of the maps."""
+"""Gains of the maps."""
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """A limit cycle: frequency (Hz) and amplitude at the encoder (rad); infinite where none bounds the growth."""
+    """A limit cycle: frequency (Hz) and amplitude at the encoder (rad); infinite if the motion grows without limit."""
 
     frequency: float
     amplitude: float
@@ -33,7 +33,7 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Margins:
-    """How far one compensator is from instability.
+    """Stability margins of one compensator.
 
     Attributes
     ----------
@@ -42,20 +42,20 @@ class Margins:
     law : LinearContact
         The compensator's law at the small amplitude.
     filter_hz : float
-        Of its input; 0 for none.
+        Corner of the filter at its input, Hz; 0 for none.
     at_one : Poles
         Least stable pole with gain 1.
     gain : float
-        The loop is stable for all gains from 0 to this; NaN where it is unstable without compensation.
+        The loop is stable for all gains from 0 to this; NaN if it is unstable without compensation.
     static : float
-        The gain at which no stiffness is left.
+        The gain at which the stiffness is zero.
     softer : float
-        The part of the contact that may be missing with gain 1; NaN where that is unstable anyway.
+        Relative loss of contact stiffness that the loop tolerates with gain 1; NaN if it is unstable.
     counts : float
         The loop with gain 1 is stable for all factors on the measured angle from 0 to this; above 4/pi the encoder's
-        counts make no cycle; NaN where it is unstable anyway.
+        quantisation causes no limit cycle; NaN if it is unstable.
     cycle : Cycle or None
-        Where an unstable loop ends, with gain 1; None where it is stable.
+        Limit cycle of an unstable loop with gain 1; None if it is stable.
     """
 
     name: str
@@ -69,7 +69,7 @@ class Margins:
     cycle: Cycle | None
 
     def line(self) -> str:
-        """A row of the table."""
+        """Return a row of the table."""
         sieve = f"{self.filter_hz:g} Hz" if self.filter_hz else "none"
         pole = f"{self.at_one.growth:+9.1f}/s at {self.at_one.frequency:5.1f} Hz"
         end = ""
@@ -119,7 +119,7 @@ class SafeGain:
 class Map:
     """One compensator's loop over gain and sample time, or gain and filter.
 
-    ``growth`` (1/s) and ``frequency`` (Hz) of the least stable pole have shape (gains, sample times or filters).
+    ``growth`` (1/s) and ``frequency`` (Hz) of the least stable pole, shape (gains, sample times or filters).
     """
 
     name: str
@@ -135,19 +135,19 @@ class Stability:
     ----------
     axis : Axis
     drive : Drive
-        Its law and gain are not used.
+        Without its law and gain.
     drivetrain : Drivetrain
-        With the contact as it is at the small amplitude.
+        With the contact at the small amplitude.
     linear_limit : float
-        The linear controller alone is stable up to this factor on its bandwidth; NaN where at none.
+        The linear controller alone is stable up to this factor on its bandwidth; NaN if at none.
     margins : tuple of Margins
         The first without compensation.
     over_time, over_filter : mapping of str to array
         Gain margin at `TIMES` and, with a filter, at `FILTERS`.
     recommended : mapping of str to SafeGain or None
-        None where nothing tried is safe.
+        None if no setting is safe.
     time_map, filter_map : Map
-        Of the stiffest compensator: `GAINS` over `TIMES` without filter, and over `FILTERS`.
+        Maps of the stiffest compensator: `GAINS` over `TIMES` without filter, and over `FILTERS`.
     """
 
     axis: Axis
@@ -163,11 +163,11 @@ class Stability:
 
     @property
     def linear(self) -> Margins:
-        """Without compensation."""
+        """Margins without compensation."""
         return self.margins[0]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {
             "drivetrain": asdict(self.drivetrain), "drive": asdict(self.drive),
             "visible_stiffness": self.drivetrain.visible,
@@ -180,7 +180,7 @@ class Stability:
         }  # fmt: skip
 
     def lines(self) -> list[str]:
-        """What people read."""
+        """Return the lines of the report."""
         d = self.drive
         limit = (
             "at no bandwidth"

@@ -1,4 +1,4 @@
-"""How well a rig followed its reference: errors, oscillation, sticking, by what its encoder and its motor show."""
+"""Tracking metrics of a rig: errors, oscillation and sticking, from encoder and motor torque."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from stickslip.record import Record
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SHAKING = 5.0
-"""Hz above which motion is oscillation: ten times the quickest reference. The first run had 20 Hz, which cut through
-the cycles of the 10 Hz loops."""
+"""Hz above which motion is oscillation: ten times the fastest reference, and below the cycles of the 10 Hz loops
+(decision 0014)."""
 NEAR = 0.3
-"""Share of the reference's peak velocity below which it is near zero velocity."""
+"""Share of the reference's peak velocity that counts as near zero velocity."""
 STILL = 0.1
 """Share of the reference's peak velocity below which the axis sticks while the reference moves with over `NEAR`."""
 SMOOTH = 15.0
-"""Hz, of the low-pass through which sticking is judged: a count per sample is faster than the slow reference."""
+"""Corner of the low-pass for detecting sticking, Hz: one count per sample is faster than the slow reference."""
 LATE = 0.2
-"""Last part of the run that counts as steady state."""
+"""Last share of the run that counts as steady state."""
 METRICS = (
     "position_rms_rad", "position_peak_rad", "position_above_5Hz_rms_rad", "near_zero_rms_rad", "away_rms_rad",
     "smooth_error_rms_rad", "sticking_share", "steady_state_error_rad", "late_oscillation_rad", "response_time_s",
@@ -31,7 +31,7 @@ METRICS = (
 
 
 def tracking_metrics(record: Record, torque_limit: float = math.inf) -> dict[str, float]:
-    """Numbers of a run along a reference.
+    """Return the metrics of a run along a reference.
 
     Parameters
     ----------
@@ -44,10 +44,10 @@ def tracking_metrics(record: Record, torque_limit: float = math.inf) -> dict[str
     Returns
     -------
     dict
-        `METRICS`: errors in rad; ``position_above_5Hz_rms_rad`` and ``late_oscillation_rad`` (the same at steady
-        state) say how much it oscillates; ``smooth_error_rms_rad`` is the error without that; ``sticking_share`` the
-        part of the time in which the axis stands though the reference moves fast; ``response_time_s`` when 90 % of the
-        reference's end is reached; ``strongest_Hz`` where the oscillation is.
+        `METRICS`: errors in rad; ``position_above_5Hz_rms_rad`` and ``late_oscillation_rad`` (the same at steady state)
+        measure the oscillation; ``smooth_error_rms_rad`` is the error without it; ``sticking_share`` the share of the
+        time in which the axis rests while the reference moves fast; ``response_time_s`` the time to 90 % of the
+        reference's end; ``strongest_Hz`` the frequency of the oscillation.
     """
     time = record.time - record.time[0]
     step = float(np.median(np.diff(time)))
@@ -77,7 +77,7 @@ def _rms(values: Array) -> float:
 
 
 def _low_passed(values: Array, corner: float, step: float) -> Array:
-    """Fourth-order Butterworth low-pass run both ways: no lag."""
+    """Apply a zero-phase fourth-order Butterworth low-pass."""
     signal: Any = importlib.import_module("scipy.signal")
     if values.size < 64:
         return values
@@ -86,13 +86,13 @@ def _low_passed(values: Array, corner: float, step: float) -> Array:
 
 
 def _parted(error: Array, step: float) -> tuple[Array, Array]:
-    """The error below and above `SHAKING`."""
+    """Split the error into the parts below and above `SHAKING`."""
     slow = _low_passed(error, SHAKING, step)
     return slow, error - slow
 
 
 def _strongest(fast: Array, step: float) -> float:
-    """Frequency at which the oscillation is strongest, Hz."""
+    """Return the frequency at which the oscillation is strongest, Hz."""
     if fast.size < 64 or not np.any(fast):
         return 0.0
     signal: Any = importlib.import_module("scipy.signal")

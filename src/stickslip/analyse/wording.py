@@ -1,19 +1,19 @@
-"""Numbers as people read them."""
+"""Format numbers for people."""
 
 from __future__ import annotations
 
 import math
 
 UNBOUNDED = 1e6
-"""Times a value from which on the end of its interval bounds nothing."""
+"""Multiple of a value above which the end of its interval counts as unlimited."""
 HUGE = 1e30
-"""The same where the value is 0."""
+"""The same for the value 0."""
 NO_LIMIT = "no limit"
 PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"))
 
 
 def quantity(value: float, unit: str) -> str:
-    """A value with three digits, in milli or micro units where that is easier to read."""
+    """Return a value with three digits, in milli or micro units if that is easier to read."""
     if not unit or unit == "/s":
         return f"{value:.3g} {unit}".rstrip()
     if abs(value) < 1e-10:
@@ -23,14 +23,14 @@ def quantity(value: float, unit: str) -> str:
 
 
 def ends(value: float, lower: float, upper: float, form: str = ".4g") -> tuple[str, str]:
-    """The ends of an interval; "no limit" for one that is infinite or many decades beyond the value.
+    """Return the bounds of an interval; "no limit" for one that is infinite or many decades beyond the value.
 
     Parameters
     ----------
     value, lower, upper : float
         In one unit.
     form : str
-        How the ends are written.
+        Format of the bounds.
     """
     most = UNBOUNDED * max(abs(value), min(abs(lower), abs(upper))) or HUGE
     low = NO_LIMIT if lower < -most or lower == -math.inf else format(lower, form)

@@ -55,7 +55,7 @@ CODE = (
     "export",
     "machine",
 )
-"""Verbs that read TOML files in which laws may be named; `rig` and `analyse` have the option in their actions."""
+"""Verbs that read TOML files with names of laws; `rig` and `analyse` have the option in their actions."""
 WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "identify": {"model": ("model",)},
     "compare": {"first": ("model",), "second": ("model",)},
@@ -69,17 +69,17 @@ WANTED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "rig": {"rig": ("rig", "machine", "model")},
     "machine": {"name": ("machine", "model")},
 }
-"""Per verb and argument, the kinds of file that it takes, or knows better what to say of; records are looked at where
-they are read."""
+"""Kinds of files by verb and argument that the verb accepts or reports better itself; records are checked when they are
+read."""
 
 
 REMARKS = (ModelRemark, UnusedPlace)
-"""Warnings that the command line prints in one line."""
+"""Warnings that the command line prints in one line each."""
 OPTION = re.compile(r"--([a-z][a-z-]*)")
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that complains in one line, and takes numbers that a machine can have."""
+    """An argument parser with one-line errors that accepts only representable numbers."""
 
     def __init__(self, *args: Any, **named: Any) -> None:
         super().__init__(*args, **named)
@@ -91,7 +91,7 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message}; see `{self.prog} --help`")
 
     def parse_known_args(self, *args: Any, **named: Any) -> Any:
-        """Parse; an option that the verb does not have is named with the nearest that it has."""
+        """Parse; for an unknown option the error names the nearest one."""
         known, rest = super().parse_known_args(*args, **named)
         for word in rest:
             if word.startswith("--"):
@@ -143,14 +143,14 @@ def real_number(text: str) -> float:
 
 @shown_on(Surface.COMMAND_LINE)
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line. Returns the exit code."""
+    """Run the command line; return the exit code."""
     _tolerate_any_terminal()
     _one_thread_for_algebra()
     notice = compiling.Notice(sys.stderr)
     if argv is None:
         _collect_seldom()
         if not sys.warnoptions:
-            # NumPy's are of numbers that are looked at afterwards; tests and python -W see them.
+            # NumPy's warnings are about numbers that are checked later; tests and python -W show them.
             warnings.filterwarnings("ignore", category=RuntimeWarning)
         compiling.listen(notice)
         waiting.listen(_tell)
@@ -166,7 +166,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as stop:
         return _complain(f"interrupted; {stop}" if stop.args else "interrupted", 130)
     except BrokenPipeError:
-        # The reader (`| head`) has gone; Python would complain once more when it flushes at exit.
+        # The reader (`| head`) is gone; Python would report this again when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
     except BEYOND as error:
@@ -176,7 +176,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _tell(line: str) -> None:
-    """A line on stderr, above a bar if there is one."""
+    """Print a line on stderr, above a progress bar if there is one."""
     line = one_line(line)
     if "tqdm" in sys.modules:
         sys.modules["tqdm"].tqdm.write(f"stickslip: {line}", file=sys.stderr)
@@ -185,19 +185,21 @@ def _tell(line: str) -> None:
 
 
 def _one_thread_for_algebra() -> None:
-    """Matrices here are small: threads of the algebra library would mostly wait for each other, at full load."""
+    """Use one thread for linear algebra: matrices are small, so threads would mostly wait for each other at full
+    load."""
     if "numpy" not in sys.modules:
         for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
             os.environ.setdefault(name, "1")
 
 
 def _collect_seldom() -> None:
-    """Imports make many objects and little garbage; looking for it after every 700 took 7 % of `identify`'s time."""
+    """Collect garbage rarely: imports create many objects and little garbage, and checking after every 700 took 7 % of
+    `identify`'s time."""
     gc.set_threshold(100_000, 20, 20)
 
 
 def parser_of(names: Sequence[str] = VERBS) -> argparse.ArgumentParser:
-    """The parser of these verbs; their modules are imported."""
+    """Return the parser of some verbs; their modules are imported."""
     parser = Parser(
         prog="stickslip",
         description="Identify, simulate and compensate friction of servo axes, and export the result.",
@@ -216,7 +218,7 @@ def parser_of(names: Sequence[str] = VERBS) -> argparse.ArgumentParser:
 
 
 def allow_code_argument(parser: argparse.ArgumentParser) -> None:
-    """What lets code run that came with a file."""
+    """Add the option that lets code named in a file run."""
     parser.add_argument(
         "--allow-code", action="store_true",
         help="run Python code named in the given files; its SHA-256 is remembered",
@@ -224,7 +226,7 @@ def allow_code_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def _dispatch(argv: list[str]) -> int:
-    # Only the verb that is called is imported; all of them where help or a complaint lists them.
+    # Only the called verb is imported; all of them if help or an error lists them.
     if argv and not argv[0].startswith("-") and argv[0] not in VERBS:
         raise InputError(f"unknown verb {argv[0]!r}; {suggestion(argv[0], VERBS)}")
     if any("\0" in word for word in argv):
@@ -232,7 +234,7 @@ def _dispatch(argv: list[str]) -> int:
     if odd := next((word for word in argv if not is_unicode(word)), ""):
         raise InputError(f"the argument {odd!r} is not Unicode; rename the file or folder in UTF-8")
     if odd := next((word for word in argv if OPTION.match(word) and word.partition("=")[2] == "--"), ""):
-        # argparse drops these two dashes and hands an empty list to the verb.
+        # argparse drops these two dashes and passes an empty list to the verb.
         raise InputError(f"{odd}: -- is not a value; give one, or leave the option out")
     parser = parser_of(argv[:1] if argv and argv[0] in VERBS else VERBS)
     try:
@@ -254,7 +256,7 @@ def _dispatch(argv: list[str]) -> int:
 
 
 def is_unicode(text: str) -> bool:
-    """Return whether a text can be written into reports and models; a file name of any bytes cannot."""
+    """Return whether a text is valid Unicode for reports and models; file names may have arbitrary bytes."""
     try:
         text.encode()
     except UnicodeEncodeError:
@@ -263,7 +265,7 @@ def is_unicode(text: str) -> bool:
 
 
 def _check_kinds(args: argparse.Namespace) -> None:
-    """Refuse files of another kind than the verb of `args` takes.
+    """Refuse files of a kind that the verb of `args` does not accept.
 
     Raises
     ------
@@ -295,20 +297,21 @@ def _remarks() -> Generator[None]:
 
 
 def as_given(message: str, argv: Sequence[str]) -> str:
-    """A message that names as an option, ``--torque-constant -1``, the value that was given by one."""
+    """Return a message in which a value that was given by an option has the name of the option: ``--torque-constant
+    -1``."""
     for option in {found[1] for word in argv if (found := OPTION.match(word))}:
         message = re.sub(rf"(?<![\w.-]){option.replace('-', '_')} = ", f"--{option} ", message)
     return message
 
 
 def _complain(what: object, code: int) -> int:
-    """Print one line on stderr, whatever the message holds."""
+    """Print a message as one line on stderr."""
     print(f"stickslip: {one_line(str(what))}", file=sys.stderr)
     return code
 
 
 def _tolerate_any_terminal() -> None:
-    """Let units like N·m pass a terminal that has no such letters."""
+    """Print units like N·m even on a terminal without such characters."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the bench, print which compensator is for what, write the report."""
+    """Run the bench, print the best compensator for each condition, write the report."""
     from stickslip.cli import _output
     from stickslip.report.bench_report import write_bench_report
     from stickslip.study.bench import path_of, run_bench

@@ -1,4 +1,4 @@
-"""The option that lets a verb of the command line replace files that are not stickslip's own."""
+"""The option for replacing files that stickslip did not write."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["LEDGER", "force_argument", "listed", "ours", "refuse_foreign", "writ
 
 
 def force_argument(parser: argparse.ArgumentParser) -> None:
-    """The option that lets a verb replace what is not its own."""
+    """Add the option for replacing files that stickslip did not write."""
     parser.add_argument(
         "--force", action="store_true",
         help="overwrite existing files, even edited ones",

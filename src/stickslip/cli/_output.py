@@ -1,4 +1,4 @@
-"""What the verbs print: tables, JSON, progress."""
+"""Output of the verbs: tables, JSON, progress."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 COLUMNS = (("position_rms_rad", 1e3, "RMS"), ("position_peak_rad", 1e3, "peak"))
 """Metrics of the table on the terminal, with their factor to mrad."""
 SELDOM = 20.0
-"""s between two lines of progress where there is no terminal."""
+"""Time between two lines of progress without a terminal, s."""
 
 
 @contextmanager
 def progress_bar(title: str) -> Generator[Callable[[int, int], None]]:
-    """A bar with the time left on stderr, or a line now and then where that is no terminal; gives
+    """Show a progress bar with the remaining time on stderr, or a line at intervals without a terminal; yield
     ``progress(finished, all)``."""
     if not sys.stderr.isatty():
         yield _lines(title)
@@ -48,7 +48,7 @@ def progress_bar(title: str) -> Generator[Callable[[int, int], None]]:
 
 
 def _lines(title: str) -> Callable[[int, int], None]:
-    """Progress for a file or a pipe: nothing of what is soon done, then a line every `SELDOM` seconds."""
+    """Print progress to a file or pipe: a line every `SELDOM` seconds, nothing for short work."""
     begun = said = time.monotonic()
     first: int | None = None
 
@@ -68,32 +68,32 @@ def _lines(title: str) -> Callable[[int, int], None]:
 
 
 def say(what: str) -> None:
-    """Say on a terminal what goes on."""
+    """Print the progress on a terminal."""
     if sys.stderr.isatty():
         print(what, file=sys.stderr)
 
 
 def tell(what: str) -> None:
-    """Say on stderr what goes on, in a file too: a line per step is what a log of a long run wants."""
+    """Print the progress on stderr, also into a file: the log of a long run needs one line per step."""
     print(what, file=sys.stderr, flush=True)
 
 
 def warn(what: str) -> None:
-    """Say on stderr what a reader of the results must know, above a bar if there is one."""
+    """Print a caveat about the results on stderr, above a progress bar if there is one."""
     from tqdm import tqdm
 
     tqdm.write(f"stickslip: {what}", file=sys.stderr)
 
 
 def duration(seconds: float) -> str:
-    """A time for people: in s, min or h."""
+    """Return a duration as text in s, min or h."""
     if seconds < 90.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def print_json(data: Any) -> None:
-    """Print data as JSON that any reader takes: NaN becomes null."""
+    """Print data as standard JSON: NaN becomes null."""
     print(json.dumps(_plain(data), indent=1, allow_nan=False, ensure_ascii=False))
 
 
@@ -108,13 +108,13 @@ def _plain(data: Any) -> Any:
 
 
 def print_metrics(metrics: Mapping[str, float]) -> None:
-    """One line a metric; "none" where there is no number."""
+    """Print one line per metric; "none" without a number."""
     for name, value in metrics.items():
         print(f"{name:<44}{'none' if math.isnan(value) else f'{value:.6g}':>14}")
 
 
 def print_learned(meta: Mapping[str, Any]) -> None:
-    """What the controller of a run has learned, a line a value."""
+    """Print what the controller of a run has learned, one line per value."""
     if not meta.get("learned"):
         return
     from stickslip.control.learned import told
@@ -123,13 +123,13 @@ def print_learned(meta: Mapping[str, Any]) -> None:
 
 
 def print_accuracy(meta: Mapping[str, Any]) -> None:
-    """What a checked run says of its error; nothing where it was not checked."""
+    """Print the error estimate of a checked run; nothing without a check."""
     found = meta.get("accuracy")
     if not found:
         return
     if found.get("depends_on_start"):
         print(
-            "start: this run depends on its initial position: shifted by 1e-9 rad it takes another branch, "
+            "start: this run depends on its initial position: shifted by 1e-9 rad it follows another branch, "
             f"{found['start_rad']:.2g} rad away; its metrics are those of one branch"
         )
     if "error_rad" not in found:
@@ -152,7 +152,7 @@ def print_accuracy(meta: Mapping[str, Any]) -> None:
 
 
 def print_integrator(meta: Mapping[str, Any]) -> None:
-    """What ran a case where the integrators that come first could not, or which machine; else nothing."""
+    """Print the integrator if the first choice could not run the case, or the machine; else nothing."""
     if machine := meta.get("machine"):
         left = f" without {', '.join(machine['without'])}" if machine["without"] else ""
         every = meta["counts"]["substeps"]
@@ -160,12 +160,12 @@ def print_integrator(meta: Mapping[str, Any]) -> None:
             f"machine: {machine['name']}{left}, sampled every {meta['sample_time']:g} s in {every} sub-steps"
         )
     if refused := meta.get("refused"):
-        loose = " (its steps keep no tolerance)" if meta["integrator"] == "fixed" else ""
+        loose = " (without error control)" if meta["integrator"] == "fixed" else ""
         print(f"integrator: {meta['integrator']}{loose}; {'; '.join(refused.values())}")
 
 
 def result_as_data(result: StudyResult, report: Path | None) -> dict[str, Any]:
-    """A study's result as plain data."""
+    """Return a study's result as plain data."""
     return {
         "folder": str(result.folder),
         "report": str(report) if report else None,
@@ -190,9 +190,9 @@ def _run_as_data(run: Run) -> dict[str, Any]:
 
 
 def print_study(result: StudyResult, report: Path | None, kept: int) -> None:
-    """A block for each slip rule and reference: controllers over frictions, the best of each marked.
+    """Print a block for each slip rule and reference: controllers over frictions, with the best of each marked.
 
-    `kept` is how many runs metrics.csv holds.
+    `kept` is the number of runs in metrics.csv.
     """
     from stickslip.study.result import designed_for
 
@@ -219,11 +219,11 @@ def print_study(result: StudyResult, report: Path | None, kept: int) -> None:
 
 
 def print_starts(runs: Sequence[Run]) -> None:
-    """The runs whose branch of the motion depends on their start."""
+    """Print the runs whose motion depends on their start."""
     named = [run.key for run in runs if run.depends_on_start]
     if named:
         print(
-            "these depend on their initial position (shifted by 1e-9 rad they take another branch): "
+            "these depend on their initial position (shifted by 1e-9 rad they follow another branch): "
             f"{', '.join(named)}"
         )
 
@@ -266,14 +266,14 @@ def _or_inf(value: float) -> float:
 
 
 def report_failures(failed: Sequence[tuple[str, str, Path]]) -> int:
-    """Say on stderr which runs ended early, one line each. Returns the exit code."""
+    """Print the runs that ended early on stderr, one line each; return the exit code."""
     for key, why, path in failed:
         print(f"stickslip: {key}: {why}; its record until then is {path}", file=sys.stderr)
     return 1 if failed else 0
 
 
 def print_sweep(rows: Sequence[Mapping[str, Any]], metric: str, wall: float, written: Sequence[Path]) -> None:
-    """A line a run: percentiles of a metric, flagged and missing cases."""
+    """Print one line per run: percentiles of a metric, flagged and missing cases."""
     from stickslip.sweep.summary import summary_lines
 
     print(*summary_lines(rows, metric), sep="\n")
@@ -283,7 +283,7 @@ def print_sweep(rows: Sequence[Mapping[str, Any]], metric: str, wall: float, wri
 
 
 def print_tuned(tuned: Tuned, written: Sequence[Path]) -> None:
-    """What was chosen for a run, before and after."""
+    """Print the setting chosen for a run, before and after."""
     print(tuned)
     for path in written:
         print(path)

@@ -1,4 +1,4 @@
-"""What the verbs that read records share: the options that say how, and the profile that is kept."""
+"""Options for reading records, shared by several verbs, and the saved profile."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser, *, part: bool = False) -> None:
-    """--map, --profile and the numbers that units need; with `part` what takes a part of the record."""
+    """Add --map, --profile and the numbers that units require; with `part` the options for a part of the record."""
     group = parser.add_argument_group("reading")
     group.add_argument(
         "--map",
@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser, *, part: bool = False) -> Non
 
 
 def _add_part(group: argparse._ArgumentGroup) -> None:  # type: ignore[reportPrivateUsage]
-    """--from, --to, --rows, --leave-out, --unwrap, --accept: what the doctor's remedies ask for."""
+    """Add --from, --to, --rows, --leave-out, --unwrap and --accept, the options in the doctor's remedies."""
     group.add_argument(
         "--accept", action="append", default=[], metavar="CODE",
         help="treat this error of the doctor as a warning; repeatable",
@@ -81,7 +81,7 @@ def _add_part(group: argparse._ArgumentGroup) -> None:  # type: ignore[reportPri
 
 
 def read_record(path: Path, args: argparse.Namespace) -> Record:
-    """The record of a file, for verbs that show no columns: stderr says where a saved profile had a part in it.
+    """Return the record of a file, for verbs that print no columns; the use of a saved profile is reported on stderr.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def read_record(path: Path, args: argparse.Namespace) -> Record:
 
 
 def reading_of(args: argparse.Namespace) -> Reading:
-    """What the options say of reading; the mapping is kept for the next file with these columns."""
+    """Return how to read from the options; the mapping is saved for the next file with these columns."""
     out: Reading = {
         "map": args.map, "profile": args.profile, "sample_time": args.sample_time, "remember": True,
         "side": args.side, "lead": None if args.lead is None else 1e-3 * args.lead,
@@ -116,11 +116,11 @@ def reading_of(args: argparse.Namespace) -> Reading:
 
 
 SHOWN = 8
-"""Columns that are named where they are not used"""
+"""Most unused columns that are listed"""
 
 
 def print_columns(opened: Opened) -> None:
-    """The table of channels, columns, units, and who says so."""
+    """Print the table of channels, columns, units and their sources."""
     record = opened.record
     reading: dict[str, Any] = record.meta["reading"]
     sources = {

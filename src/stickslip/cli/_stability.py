@@ -63,7 +63,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def work(
     args: argparse.Namespace, show: Callable[[argparse.Namespace, list[Any], Callable[[], Any]], None]
 ) -> None:
-    """Compute and show."""
+    """Compute and print the stability."""
     if args.controller:
         composed(args, show)
         return
@@ -86,13 +86,13 @@ def work(
 BESIDE: dict[str, Any] = {
     "linear": "PD", "bandwidth": 36.0, "damping": 1.0, "sample_time": None, "filter": [], "law": [],
 }  # fmt: skip
-"""Options of a linear controller and its compensators, and what they are where they are not given."""
+"""Options of a linear controller and its compensators, with defaults."""
 
 
 def composed(
     args: argparse.Namespace, show: Callable[[argparse.Namespace, list[Any], Callable[[], Any]], None]
 ) -> None:
-    """The same of a controller made of control laws."""
+    """Compute and print the stability of a controller made of control laws."""
     from stickslip.analyse.controller_margins import controller_stability
     from stickslip.analyse.machine_axis import axis_of
     from stickslip.control.files import read_controller
@@ -119,9 +119,7 @@ def composed(
         from stickslip.study.controller_confirmed import confirmed_controller
 
         tried = confirmed_controller(plant, controller)
-        amplitude = (
-            amplitude or tried.amplitude
-        )  # what is said of poles is said of the motion that is confirmed
+        amplitude = amplitude or tried.amplitude  # the poles apply to the motion that is confirmed
     found = controller_stability(axis_of(plant, amplitude), controller, delay)
     results: list[Any] = [found, tried] if tried else [found]
 
@@ -134,7 +132,7 @@ def composed(
 
 
 def machine_of(args: argparse.Namespace) -> Machine:
-    """The machine without what is switched off."""
+    """Return the machine without the imperfections switched off."""
     from stickslip.errors import InputError
     from stickslip.machines.files import machine
 
@@ -144,7 +142,7 @@ def machine_of(args: argparse.Namespace) -> Machine:
 
 
 def described(args: argparse.Namespace) -> tuple[Machine, Gains, dict[str, Model]]:
-    """The machine, the linear controller and the compensators' laws that the options describe."""
+    """Return the machine, the linear controller and the compensators' laws of the options."""
     from stickslip.control.linear import place
     from stickslip.errors import InputError
 
@@ -159,7 +157,7 @@ def described(args: argparse.Namespace) -> tuple[Machine, Gains, dict[str, Model
 
 
 def computed(args: argparse.Namespace) -> Stability:
-    """The stability of what the options describe."""
+    """Return the stability for the options."""
     from stickslip.analyse.machine_axis import axis_of
     from stickslip.analyse.presliding_loop import Drive
     from stickslip.analyse.stability import stability

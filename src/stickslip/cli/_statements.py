@@ -1,4 +1,4 @@
-"""What `stickslip study` prints of experiments: the thesis's statements that were judged."""
+"""Output of `stickslip study` for experiments: the thesis's statements that were tested."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share, tally
 
 
 def judged_in(result: StudyResult) -> list[Judged]:
-    """Every statement on the variants that were run; empty for experiments on which none can be judged."""
+    """Return every statement on the variants that were run; empty if none can be tested."""
     if "experiments" not in result.config:
         return []
     view = ExperimentView(result)
@@ -22,7 +22,7 @@ def judged_in(result: StudyResult) -> list[Judged]:
 
 
 def statements_as_data(result: StudyResult, judged: list[Judged], report: Path | None) -> dict[str, Any]:
-    """Plain data."""
+    """Return plain data."""
     return {
         "folder": str(result.folder), "report": str(report) if report else None,
         "statements": verdict_table(judged), "main": main_share(judged),
@@ -31,7 +31,7 @@ def statements_as_data(result: StudyResult, judged: list[Judged], report: Path |
 
 
 def print_statements(result: StudyResult, judged: list[Judged], report: Path | None) -> None:
-    """One line a statement, the main ones, and where the files lie."""
+    """Print one line per statement, the main statements, and the paths of the files."""
     for row in verdict_table(judged):
         if row["word"] != "not run":
             share = f"  ({row['share']} starts)" if row["share"] else ""
@@ -49,7 +49,7 @@ def print_statements(result: StudyResult, judged: list[Judged], report: Path | N
 
 
 def print_tallies(judged: list[Judged]) -> None:
-    """Print how statements fare from further starts, and without single imperfections."""
+    """Print how many statements hold from further starts, and without single imperfections."""
     if starts := tally_starts(judged):
         print("\nfrom further starts    statements  hold  hold always  hold never  share of starts")
         for t in starts:

@@ -42,7 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what was found; draw it."""
+    """Print the result; draw it."""
     from stickslip.errors import InputError
     from stickslip.report.plots import FORMATS
 
@@ -63,7 +63,7 @@ def _with_records(parser: argparse.ArgumentParser) -> None:
 
 
 def _opened(args: argparse.Namespace) -> list[tuple[str, Record]]:
-    """Name and record of every argument; without a name the file's."""
+    """Return name and record of every argument; the default name is the file's."""
     out: list[tuple[str, Record]] = []
     for text in args.records:
         name, equals, path = str(text).partition("=")
@@ -73,7 +73,7 @@ def _opened(args: argparse.Namespace) -> list[tuple[str, Record]]:
 
 
 def _show(args: argparse.Namespace, found: Sequence[Any], picture: Callable[[], Any]) -> None:
-    """Lines or JSON, and the picture where one is wanted."""
+    """Print lines or JSON, and draw the picture if requested."""
     from stickslip.cli import _output
 
     if args.json:
@@ -239,14 +239,14 @@ def _sides(args: argparse.Namespace) -> None:
 
 
 def _runs(args: argparse.Namespace) -> list[tuple[str, Record]]:
-    """Every run of every record."""
+    """Return every run of every record."""
     from stickslip.analyse.split_runs import pieces
 
     return [piece for name, record in _opened(args) for piece in pieces(name, record)]
 
 
 def _distinct(named: Sequence[tuple[str, Record]]) -> dict[str, Record]:
-    """Records by name; those of the same name are numbered."""
+    """Return records by name; equal names are numbered."""
     names = [name for name, _ in named]
     return {
         name if names.count(name) == 1 else f"{name}-{names[: i + 1].count(name)}": record

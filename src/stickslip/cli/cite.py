@@ -13,7 +13,7 @@ SUMMARY = "print references in BibTeX"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What was used."""
+    """Add the argument: what was used."""
     parser.add_argument(
         "things", nargs="*", metavar="WHAT",
         help="laws, studies or TOML files, records (.npz), manifest.json or the folder of a study",

@@ -32,14 +32,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the three verbs, each with its command."""
+    """Run the three verbs and print each command."""
     from stickslip.whole_files import prepared_folder
 
     log: Path = args.log or args.out / "demo.csv"
     prepared_folder(log.parent)
     copy_log(log, args.force)
     print("A simulated record: a servo axis with Stribeck friction, noise on its torque, a 16-bit encoder.")
-    print(f"True are: {TRUTH}.")
+    print(f"True values: {TRUTH}.")
     if args.log:
         print(log)
         return 0
@@ -71,12 +71,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def copy_log(log: Path, force: bool) -> None:
-    """Write the log that ships.
+    """Write the log that ships with the package.
 
     Raises
     ------
     InputError
-        If it cannot be written, or would replace a file that is not stickslip's own.
+        If it cannot be written, or would replace a file that stickslip did not write.
     """
     from importlib.resources import files
 
@@ -88,7 +88,7 @@ def copy_log(log: Path, force: bool) -> None:
 
 
 def step(words: list[str]) -> int:
-    """One verb, its errors passed on."""
+    """Run one verb and pass on its errors."""
     from stickslip.cli import parser_of
 
     args = parser_of(words[:1]).parse_args(words)

@@ -65,7 +65,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def compensator_arguments(parser: argparse.ArgumentParser) -> None:
-    """A controller or a compensator in place of the law."""
+    """Add the options for exporting a controller or a compensator in place of the law."""
     parser.add_argument(
         "--controller", action="store_true", help="export the whole sampled controller in [controller]"
     )
@@ -119,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
         for name in TARGETS:
             print("\n".join(described(target_named(name))))
         print(
-            "Of a torque over the angle (identify --method cogging; --position-map where it has a law too):"
+            "For a torque over the angle (identify --method cogging; add --position-map if the file also has a law):"
         )
         for target in MAP_TARGETS.values():
             print(f"{target.name:<10}{target.title}{f', in {target.unit}' if target.unit else ''}")
@@ -153,7 +153,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def described(target: Target) -> list[str]:
-    """What `--list` says of a target."""
+    """Return the lines of a target for `--list`."""
     lines = [f"{target.name:<10}{target.title}", f"{'':<10}carries {target.carries}"]
     for s in target.settings:
         default = "must be given" if s.default is None else f"default {s.default}"

@@ -94,7 +94,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _law_arguments(parser: argparse.ArgumentParser) -> None:
-    """Laws, and what is known of their parameters and of the signal."""
+    """Add the options for laws, known parameters and the signal."""
     parser.add_argument(
         "--law",
         action="append",
@@ -125,7 +125,7 @@ def _law_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[reportPrivateUsage]
-    """Options of the method `axis`, and of those that need an experiment of an axis."""
+    """Add the options of the method `axis`, and of those that need an experiment of an axis."""
     parser.add_argument(
         "--inertia", type=float, metavar="J", help="known inertia, kg·m² (kg of a linear axis): not fitted"
     )
@@ -155,7 +155,7 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
     parser.add_argument(
         "--torque-is", choices=("commanded", "actual", "mean"),
         help="meaning of the torque column: commanded from this row to the next, actual at the row, or "
-        "mean since the previous row; held together with --delay, without which when the torque acted is found from "
+        "mean since the previous row; held fixed together with --delay; otherwise the timing is estimated from "
         "the record (default)",
     )  # fmt: skip
     parser.add_argument(
@@ -171,7 +171,7 @@ def _axis_arguments(parser: argparse._ArgumentGroup) -> None:  # type: ignore[re
     )
     parser.add_argument(
         "--position", dest="position_map", action="store_true",
-        help="find the torque over the angle (cogging, friction by angle), take it out and write its map",
+        help="identify the torque over the angle (cogging, friction by angle), subtract it and write its map",
     )  # fmt: skip
     parser.add_argument(
         "--load", action="store_true",
@@ -198,11 +198,11 @@ def run(args: argparse.Namespace) -> int:
     model_file, report_file = places(args.out)
     written = [model_file, *([] if args.no_report else [report_file])]
     if not args.no_report:
-        # What writes it loads while compiled code runs.
+        # Load the modules for writing while compiled code runs.
         threading.Thread(target=lambda: importlib.import_module("jinja2")).start()
 
     def begins(what: str) -> None:
-        """Logs and options are fine: before anything is computed, whether there is a place for what comes of it."""
+        """Check, before anything is computed, that the results can be written."""
         _files.refuse_foreign(written, args.force)
         _output.say(what)
 
@@ -230,7 +230,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def profiles(result: IdentificationResult) -> list[str]:
-    """The saved profiles with which the logs were read, each once."""
+    """Return the saved profiles with which the logs were read, without duplicates."""
     found = dict.fromkeys(s.record.meta["reading"].get("profile", "") for s in result.sources)
     return [path for path in found if path]
 
@@ -258,7 +258,7 @@ def values_given(options: Mapping[str, Sequence[str]]) -> dict[str, float]:
 
 
 def options_of(args: argparse.Namespace) -> dict[str, Any]:
-    """What `stickslip.verbs.identify.identify` takes besides how logs are read."""
+    """Return the arguments of `stickslip.verbs.identify.identify` without those for reading logs."""
     from stickslip.cli import _output
 
     return {
@@ -283,7 +283,7 @@ def tell(line: str) -> None:
 
 
 def as_data(result: IdentificationResult, made: Mapping[str, Path], answers: Answers) -> dict[str, Any]:
-    """What --json prints."""
+    """Return the data for --json."""
     return {
         **result.as_dict(), "data": [s.about for s in result.sources],
         "findings": {s.name: [f.as_data() for f in s.findings] for s in result.sources},
@@ -293,7 +293,7 @@ def as_data(result: IdentificationResult, made: Mapping[str, Path], answers: Ans
 
 
 def places(out: Path) -> tuple[Path, Path]:
-    """The files of model and report; the folder is made."""
+    """Return the paths of model and report; create the folder."""
     from stickslip.whole_files import prepared_folder
 
     if out.suffix == ".toml":

@@ -5,7 +5,7 @@
     stickslip law gms --plot gms.svg --set slip_rule=literal --set k=[1e4,5e3] --set alpha=[0.5,0.5]
     stickslip law my_law.py --plot
     stickslip law my_law.py --check                   tests a law of your own, for friction or control
-    stickslip law --template friction > my_law.py     a complete small law to begin from
+    stickslip law --template friction > my_law.py     a complete small law as a template
     stickslip law --template control > my_loop.py     the same for a control law
 
 Where it is documented: help("stickslip.spec") and help("stickslip.control_spec") in Python; docs/howto/own_law.md and
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from stickslip.model import Model
     from stickslip.spec import Choice, Configurable, Field, Law
 
-SUMMARY = "explain or check a friction or control law; print one to begin from"
+SUMMARY = "explain or check a friction or control law; print a template"
 TEMPLATES = ("friction", "control")
-"""Laws to begin from, in the folder ``starters``."""
+"""Templates of laws, in the folder ``starters``."""
 DEFAULT = Path()
 
 
@@ -43,7 +43,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="law listed by `stickslip laws`, control law, or path of the file of either",
     )  # fmt: skip
     parser.add_argument(
-        "--template", choices=TEMPLATES, help="print a complete small law to begin from, and exit"
+        "--template", choices=TEMPLATES, help="print a complete small law as a template, and exit"
     )
     parser.add_argument(
         "--plot", type=Path, nargs="?", const=DEFAULT, metavar="FILE",
@@ -56,14 +56,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     _files.force_argument(parser)
     parser.add_argument(
         "--check", action="store_true",
-        help="try what engines, identification and exports rely on: subset, units, dissipation, step against rate, "
-        "modes, derivatives, single precision, every export (a minute); of a control law limit, "
-        "faults, take-over and rest besides",
+        help="test the requirements of engines, identification and exports: subset, units, dissipation, step "
+        "against rate, modes, derivatives, single precision, every export (a minute); for a control law also "
+        "limit, faults, take-over and rest",
     )  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the description of the law; draw it; check it; or print one to begin from."""
+    """Print the description of the law; draw it; check it; or print a template."""
     if args.template:
         print(template(args.template), end="")
         return 0
@@ -82,12 +82,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def template(kind: str) -> str:
-    """The text of a law to begin from."""
+    """Return the text of a template."""
     return (Path(__file__).parent / "starters" / f"{kind}_law.py").read_text(encoding="utf-8")
 
 
 def named(name: str) -> Any:
-    """The friction or control law of that name or file; the error is that of a friction law where it is neither."""
+    """Return the friction or control law of a name or file; if it is neither, the error is that of a friction law."""
     from stickslip import plugins
     from stickslip.control.registry import control_law, control_law_names, law_or_control_law
 
@@ -119,13 +119,13 @@ def describe(law: Law, args: argparse.Namespace) -> int:
 
 
 def print_files(name: str, model: Model, values: Mapping[str, Any]) -> None:
-    """Print the law as a table of a study and as a file of its own."""
+    """Print the law as a table of a study and as a separate file."""
     named = f"law = {json.dumps(name, ensure_ascii=False)}"
     chosen = [f'{choice} = "{option}"' for choice, option in model.law.chosen.items()]
     numbers = [f"{key} = {value}" for key, value in values.items()]
-    print("\nas a study's file has it:")
+    print("\nin the file of a study:")
     print("\n".join(f"  {line}" for line in (named, *chosen, *numbers)))
-    print("\nas a model's file has it (model.toml):")
+    print("\nin the file of a model (model.toml):")
     choices = ("", "[choices]", *chosen) if chosen else ()
     print("\n".join(f"  {line}".rstrip() for line in (named, *choices, "", "[parameters]", *numbers)))
 
@@ -147,13 +147,13 @@ def describe_control(law: ControlLaw, args: argparse.Namespace) -> int:
 
 
 def source_line(law: Configurable) -> str:
-    """Where it comes from."""
+    """Return the line with its source."""
     source: Sequence[str] = getattr(law, "source", ())
     return f"source: {'; '.join(source) or 'none stated'}"
 
 
 def print_choices(law: Configurable) -> None:
-    """The choices, a line each, and the parameters that options bring."""
+    """Print the choices, one line each, and the parameters of their options."""
     choices: Sequence[Choice] = law.choices
     for choice in choices:
         options = ", ".join(
@@ -167,7 +167,7 @@ def print_choices(law: Configurable) -> None:
 
 
 def check(law: Any) -> int:
-    """Hold the law to its contract, a line a check; 1 where it fails one."""
+    """Test the law's contract, one line per check; return 1 if one fails."""
     from stickslip.contract import control_laws, examine
 
     verdicts = control_laws.examine(law) if law.kind == "control law" else examine(law)
@@ -177,14 +177,14 @@ def check(law: Any) -> int:
         failures += verdict.passed is False
         print(f"{word:<7} {verdict.name:<18} {verdict.text}", flush=True)
     said = (
-        f"{failures} check{'s' if failures > 1 else ''} failed" if failures else "passes what could be tried"
+        f"{failures} check{'s' if failures > 1 else ''} failed" if failures else "passed all available checks"
     )
     print(f"{law.name}: {said}")
     return 1 if failures else 0
 
 
 def with_values(law: Law, settings: Sequence[str]) -> Model:
-    """The law with its example's parameters and the values that were set."""
+    """Return the law with its example's parameters and the values that were set."""
     from stickslip.config import named_values
     from stickslip.model import Model
 
@@ -218,7 +218,7 @@ def shown_values(model: Model, plain: Law, settings: Sequence[str]) -> dict[str,
 
 
 def table(title: str, fields: tuple[Field, ...]) -> None:
-    """Print one line a parameter or state."""
+    """Print one line per parameter or state."""
     if not fields:
         return
     print(f"{title}:")

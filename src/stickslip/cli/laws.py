@@ -12,7 +12,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print one line a law: name, title, source."""
+    """Print one line per law: name, title, source."""
     from stickslip import plugins
 
     rows = [(law.name, law.title, "; ".join(law.source)) for law in map(plugins.law, plugins.law_names())]

@@ -2,13 +2,12 @@
 
     stickslip learn my.toml --over angle
 
-The file is that of `stickslip simulate` with a sampled controller; its duration is one repetition. Over time, what is
-learned holds for this motion; over the angle and direction, for every motion in its range.
+The file is that of `stickslip simulate` with a sampled controller; its duration is one repetition. A table over time is
+valid for this motion; one over angle and direction for every motion in its range.
 
 Before the first run the condition of convergence is checked on the machine's response: |Q (1 - L T)| < 1, with L the
-rate, Q the low-pass and T what the loop takes of a torque at the motor. Where it does not hold, nothing is learned.
-
-Writes the controller with what was learned. `stickslip export FILE --controller` exports it,
+rate, Q the low-pass and T the response of the loop's torque to a torque at the motor. If it is not met, nothing is
+learned. Writes the controller with the learned table. `stickslip export FILE --controller` exports it,
 `stickslip rig run track --set controller=FILE` runs it on a rig; `stickslip rig run learn` learns on the rig itself.
 """
 
@@ -24,11 +23,13 @@ SUMMARY = "learn a feedforward over repetitions of a motion"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """File, settings, output."""
-    parser.add_argument("file", type=Path, metavar="FILE.toml", help="as of `stickslip simulate`")
-    parser.add_argument("--over", choices=("time", "angle"), default="time", help="what is learned over")
+    parser.add_argument("file", type=Path, metavar="FILE.toml", help="as for `stickslip simulate`")
+    parser.add_argument(
+        "--over", choices=("time", "angle"), default="time", help="domain of the learned table"
+    )
     parser.add_argument("--repetitions", type=int, default=10, metavar="N", help="repetitions (default: 10)")
     parser.add_argument(
-        "--rate", type=float, default=0.8, metavar="L", help="share taken over per repetition (default: 0.8)"
+        "--rate", type=float, default=0.8, metavar="L", help="share learned per repetition (default: 0.8)"
     )
     parser.add_argument("--corner", type=float, metavar="HZ", help="corner of Q over time (default: chosen)")
     parser.add_argument("--advance", type=int, metavar="SAMPLES", help="advance over time (default: chosen)")

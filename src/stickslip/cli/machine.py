@@ -1,8 +1,8 @@
-"""Say what a machine is: its inertia, friction, and imperfections; print its file, or one to begin from.
+"""Describe a machine: its inertia, friction, and imperfections; print its file or a template.
 
     stickslip machine                                 lists the machines of the package
-    stickslip machine thesis-dry                      what it is, with units
-    stickslip machine thesis-dry --print > mine.toml  its file, to be changed
+    stickslip machine thesis-dry                      its description, with units
+    stickslip machine thesis-dry --print > mine.toml  its file, for editing
     stickslip machine --template > mine.toml          a file with every key, its unit, meaning and default
     stickslip machine mine.toml                       checks a file of your own
     stickslip machine model.toml --print > axis.toml  the axis that was identified, as a machine
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from stickslip.machines.keys import Part
     from stickslip.machines.machine import Machine
 
-SUMMARY = "explain a machine, print its file, or one to begin from"
+SUMMARY = "describe a machine, print its file or a template"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """The name, and what is printed."""
+    """Add the arguments: the name, and what to print."""
     parser.add_argument(
         "name", nargs="?", default="", metavar="MACHINE",
         help="machine of the package, or the path of a machine's TOML file or of an identified model.toml (default: "
         "list those of the package)",
     )  # fmt: skip
     shown = parser.add_mutually_exclusive_group()
-    shown.add_argument("--print", action="store_true", help="print the machine's TOML file, to be changed")
+    shown.add_argument("--print", action="store_true", help="print the machine's TOML file, for editing")
     shown.add_argument(
         "--template", action="store_true",
         help="print a file with every key, its unit, meaning and default, and exit",
@@ -42,7 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the list, the machine, its file, or the one to begin from."""
+    """Print the list, the machine, its file, or a template."""
     from stickslip.cli import _output
     from stickslip.config import read_toml
     from stickslip.errors import InputError
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def lines(machine: Machine) -> Iterator[str]:
-    """What people read: the tables of its file with units and meanings, and what follows from them."""
+    """Return the description: the tables of its file with units and meanings, and derived numbers."""
     from stickslip.machines.keys import BY_NAME
     from stickslip.machines.written import tables_of
 
@@ -102,7 +102,7 @@ def lines(machine: Machine) -> Iterator[str]:
 
 
 def rows(part: Part, values: Mapping[str, Any]) -> Iterator[str]:
-    """A line a number that is there."""
+    """Return one line per number."""
     for key in part.keys:
         if key.name in values:
             value = values[key.name]

@@ -73,8 +73,8 @@ def drive_arguments(parser: argparse.ArgumentParser) -> None:
         )
     parser.add_argument(
         "--machine", metavar="MACHINE",
-        help="the machine at hand (of the library, or its TOML file): simulated with "
-        "its resonances, delay, amplifier, encoder and noise",
+        help="machine to simulate (library name or TOML file), with its resonances, delay, amplifier, encoder and "
+        "noise",
     )  # fmt: skip
     parser.add_argument(
         "--sample-time",
@@ -85,7 +85,7 @@ def drive_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--delay", type=float, metavar="SAMPLES",
-        help="how late a command acts, in samples (default: up to one, drawn; a --machine has its own)",
+        help="command delay in samples (default: up to one, sampled; a --machine has its own)",
     )  # fmt: skip
     parser.add_argument(
         "--reference-velocity", choices=("difference", "instant"),

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from stickslip.rigs.rig import Rig
 
 SHOWN = 4
-"""Passed checks that a report shows one by one; more are counted."""
+"""Most passed checks that a report lists; more are counted."""
 SUMMARY = "run identification procedures on a virtual or real machine"
 
 
@@ -92,14 +92,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do what was asked; 1 where a check failed."""
+    """Run the action; return 1 if a check failed."""
     if args.action == "list":
         return listed()
     return commissioned(args) if args.action == "commission" else performed(args)
 
 
 def listed() -> int:
-    """Machines, procedures, imperfections."""
+    """Print machines, procedures and imperfections."""
     from stickslip.machines.files import library, machine
     from stickslip.machines.machine import IMPERFECTIONS
     from stickslip.rigs.kinds import rig_kind_names
@@ -119,7 +119,7 @@ def listed() -> int:
 
 
 def rig_of(args: argparse.Namespace) -> Rig:
-    """The rig of --rig, without what --without names, within --limit.
+    """Return the rig of --rig, without the imperfections of --without, with the limits of --limit.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def rig_of(args: argparse.Namespace) -> Rig:
 
 
 def performed(args: argparse.Namespace) -> int:
-    """`stickslip rig run`."""
+    """Run `stickslip rig run`."""
     from stickslip.cli import _output
     from stickslip.config import named_values
     from stickslip.errors import InputError
@@ -173,7 +173,7 @@ def performed(args: argparse.Namespace) -> int:
 
 
 def sensible(chosen: Procedure, given: Mapping[str, str]) -> None:
-    """Refuse numbers that are none; which may be below 0 is the procedure's to say.
+    """Refuse numbers that are not finite; the procedure checks their sign.
 
     Raises
     ------
@@ -189,7 +189,7 @@ def sensible(chosen: Procedure, given: Mapping[str, str]) -> None:
 
 
 def told(plan: Plan, rig: Rig, args: argparse.Namespace) -> int:
-    """The plan, and whether the rig allows it."""
+    """Print the plan; return whether the rig allows it."""
     from stickslip.cli import _output
 
     plan.within(rig)
@@ -207,7 +207,7 @@ def told(plan: Plan, rig: Rig, args: argparse.Namespace) -> int:
 
 
 def commissioned(args: argparse.Namespace) -> int:
-    """`stickslip rig commission`."""
+    """Run `stickslip rig commission`."""
     from stickslip.cli import _output
     from stickslip.commission.commission import commission
     from stickslip.commission.headline import headline
@@ -257,7 +257,7 @@ def commissioned(args: argparse.Namespace) -> int:
 
 
 def print_plan(rig: Rig, cogging: Literal["", "rotation", "standstill"]) -> int:
-    """What `stickslip rig commission` would do, and how long it takes at most."""
+    """Print the plan of `stickslip rig commission` and its longest duration."""
     from stickslip.commission.commission import planned
 
     total = 0.0
@@ -271,13 +271,12 @@ def print_plan(rig: Rig, cogging: Literal["", "rotation", "standstill"]) -> int:
 def write_commissioned(
     found: Commissioned, rig: Rig, folder: Path, lines: Sequence[tuple[str, str]]
 ) -> tuple[Path, Path]:
-    """Write model.toml, machine.toml and recommended.toml where there is one, and the report; returns the model and the
-    report."""
+    """Write model.toml, machine.toml, recommended.toml if there is one, and the report; return model and report."""
     from stickslip.commission.recommended import write_identified_machine, write_recommended
     from stickslip.identify.model_file import versions, write_model
     from stickslip.report.identified import Source, write_identification
 
-    stages = [s for s in found.stages if s.name != "angle"]  # another look at the sliding record
+    stages = [s for s in found.stages if s.name != "angle"]  # a second evaluation of the sliding record
     records = {s.name: s.performed.record for s in stages}
     data = [described(folder / f"{name}.npz", len(record)) for name, record in records.items()]
     model = write_model(folder / "model.toml", found.result, data=data)
@@ -298,7 +297,7 @@ def write_commissioned(
 
 
 def findings_of(performed: Performed) -> list[Finding]:
-    """The acceptance checks of a procedure as a report shows what was found in a record."""
+    """Return the acceptance checks of a procedure as findings for a report."""
     from stickslip.finding import Finding
 
     failed = [c for c in performed.checks if not c.passed]
@@ -310,19 +309,19 @@ def findings_of(performed: Performed) -> list[Finding]:
 
 
 def described(path: Path, rows: int) -> dict[str, Any]:
-    """A record as model.toml names it."""
+    """Return the entry of a record for model.toml."""
     import hashlib
 
     return {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "rows": rows}
 
 
 def clock(seconds: float) -> str:
-    """A time for people."""
+    """Return a duration as text."""
     return f"{seconds:.3g} s" if seconds < 120.0 else f"{seconds / 60.0:.3g} min"
 
 
 def shown(result: Performed, out: Path, args: argparse.Namespace) -> int:
-    """Checks and where the record lies."""
+    """Print the checks and the path of the record."""
     from dataclasses import asdict
 
     from stickslip.cli import _output

@@ -5,7 +5,8 @@
     stickslip study compensators     every compensator on one bench of machines, references and changes of friction
     stickslip study my.toml          your own; start from a copy of thesis.toml (`stickslip study thesis --print`)
 
-Writes DIR/metrics.csv, metrics.parquet, records/, manifest.json and report.html. Finished runs are kept: after an
+Writes DIR/metrics.csv, records/, manifest.json and report.html (metrics.parquet too with the extra `parquet`).
+Finished runs are kept: after an
 interruption the same command resumes, and runs that --only leaves out stay in the tables and the report.
 """
 

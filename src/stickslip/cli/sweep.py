@@ -3,8 +3,8 @@
     stickslip sweep thesis-robustness      included: friction and inertia up to 30 % off, for every compensator
     stickslip sweep my.toml                your own; start from a copy (`stickslip sweep thesis-robustness --print`)
 
-Writes DIR/data/ (a Parquet data set), manifest.json, summary.csv and figures. Finished blocks are kept: after any
-interruption the same command resumes.
+Writes DIR/data/ (.npz files), manifest.json, summary.csv and figures, and with the extra `parquet` all cases in
+cases.parquet. Finished blocks are kept: after any interruption the same command resumes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from stickslip.sweep.plan import Sweep
 
 MANY = 1000
-"""Closed loops from which it is told beforehand how long they take."""
+"""Number of closed loops above which the duration is estimated in advance."""
 SUMMARY = "run a study over many cases, such as uncertain parameters"
 
 
@@ -43,7 +43,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def announced(sweep: Sweep, jobs: int) -> Sweep:
-    """Say before a long sweep starts how long it will take, from a few of its cases; blocks are sized so."""
+    """Print the estimated duration of a long sweep from a few of its cases; these also determine the size of blocks."""
     from stickslip.cli import _output
     from stickslip.sweep.forecast import block_size, paces_of, seconds_of
 

@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
 def _stopped_by(
     progress: Callable[[int, int], None], check: Callable[[], None]
 ) -> Callable[[int, int], None]:
-    """Show how far it is, and let Ctrl-C end the search between two settings."""
+    """Show the progress, and let Ctrl-C end the search between two settings."""
 
     def settings(tried: int, about: int) -> None:
         progress(tried, about)

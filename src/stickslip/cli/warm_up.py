@@ -1,4 +1,4 @@
-"""Compile everything in advance, so that the first calls after an installation start without delay.
+"""Compile everything in advance, so the first calls after an installation start without delay.
 
 stickslip warm-up
 
@@ -29,7 +29,7 @@ LOOPS = {
     "a cascade": "kv=60,kvp=0.08,kvi=2",
     "a cascade with a filter": "kv=60,kvp=0.08,kvi=2,filter=300",
 }
-"""Loops as drives have them, beside the PD of the demonstration: each is compiled with its control laws inside."""
+"""Typical loops of drives, in addition to the PD of the demonstration: each is compiled with its control laws."""
 IDENTIFY = ("identify", "demo.csv")
 # The fewest axes: more of them compile nothing.
 RECOMMEND = ("recommend", "axis/model.toml", "--axes", "1", "--confirm", "1")
@@ -57,7 +57,7 @@ STEPS: dict[str, Sequence[str]] = {
     "rigs": ("rig", "run", "breakaway", "--rig", "thesis-dry"),
     "sweeps": ("sweep", "thesis-robustness", "--cases", "1", "--jobs", "1", "--no-report"),
 }
-"""What is compiled, and the command that needs it."""
+"""Compiled parts, and the commands that need them."""
 LOOP = """[reference]
 kind = "sine"
 amplitude = 0.01
@@ -78,8 +78,8 @@ FILES = {
     "drive.toml": f"{AXIS}{LOOP}sample_time = 1e-3\nencoder_counts = 65536.0\n",
     "machine.toml": f'[machine]\nmachine = "ideal"\n{LOOP}',
 }
-"""A controller that takes samples has an engine of its own; so has a machine that moves along a located flow, which the
-library's others do not."""
+"""A sampled controller has its own engine; so has a machine that moves along a located flow, unlike the others of the
+library."""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -87,30 +87,30 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the steps; say what each took. 1 if one failed."""
+    """Run the steps and print their durations; return 1 if one failed."""
     from stickslip import compiling
 
-    compiling.silence()  # it is what this verb says itself
+    compiling.silence()  # printed by this verb itself
     return 1 if failures(lambda text, end: print(text, end=end, flush=True)) else 0
 
 
 @arguments_checked
 def warm_up(tell: Callable[[str], None] = print) -> None:
-    """Compile everything in advance, as `stickslip warm-up` does, so that later calls start without delay.
+    """Compile everything in advance, as `stickslip warm-up` does, so later calls start without delay.
 
     The compiled code is kept in the user's cache folder (or STICKSLIP_CACHE), for later processes too. It takes a
-    minute or two after an installation, and some seconds where nothing is left to compile. Until it returns, the
-    process works in a temporary folder.
+    minute or two after an installation, and some seconds if nothing is left to compile. Until it returns, the process
+    works in a temporary folder.
 
     Parameters
     ----------
     tell : callable
-        Is told what was compiled and how long it took, a line each.
+        Called with a line for each compiled part and its duration.
 
     Raises
     ------
     StickslipError
-        If something could not be compiled: what, and why.
+        If something could not be compiled; names it and the reason.
     """
     line = ""
 
@@ -126,7 +126,7 @@ def warm_up(tell: Callable[[str], None] = print) -> None:
 
 
 def failures(say: Callable[[str, str], None]) -> list[str]:
-    """Run the steps; what failed of them. `say` is given a text and how it ends."""
+    """Run the steps; return those that failed. `say` gets a text and its line end."""
     from stickslip.cli import main
 
     failed: list[str] = []

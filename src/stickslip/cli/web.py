@@ -16,7 +16,7 @@ SUMMARY = "open a local page in the browser for all steps"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Where it listens and keeps its projects."""
+    """Add the arguments: address and folder of projects."""
     parser.add_argument(
         "--projects", type=Path, default=Path.home() / "stickslip-projects", metavar="DIR",
         help="folder of the projects (default: stickslip-projects in your home folder)",

@@ -1,4 +1,4 @@
-"""Records from files: `read(path) -> Record`. One file a format; `FORMATS` names them.
+"""Read records from files: `read(path) -> Record`. Each format has its own module; `FORMATS` lists them.
 
 To add a format, write its file (recognise, read, FORMAT) and add its name to that tuple in `reading.py`.
 """

@@ -1,4 +1,4 @@
-"""Text of a file, and the number in a cell of it: decimal commas, thousands, truth, dates and times of day."""
+"""Decode text files and parse their cells: decimal commas, thousands, truth values, dates and times of day."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ THOUSANDS = {
     ".": re.compile(r"([-+]?\d{1,3}(?:[,'\u00a0\u202f]\d{3})+)\.(\d*)"),
     ",": re.compile(r"([-+]?\d{1,3}(?:[.'\u00a0\u202f]\d{3})+),(\d*)"),
 }
-"""Numbers with signs between the thousands, by the decimal sign."""
+"""Numbers with thousands separators, by their decimal sign."""
 OF_DAY = re.compile(r"([01]?\d|2[0-3]):([0-5]\d):([0-5]\d)(?:[.,](\d+)|[;:](\d{1,3}))?")
-"""Hours, minutes, seconds; a fraction of these, or milliseconds apart (Studio 5000: ``10:15:22;122``)."""
+"""Hours, minutes, seconds; a fraction of them, or separate milliseconds (Studio 5000: ``10:15:22;122``)."""
 IN_TWO = re.compile(r"(?<![\d:])((?:[01]?\d|2[0-3]):[0-5]\d:[0-5]\d),(\d{3})(?=,)")
-"""A time of day whose milliseconds the comma between cells cuts off."""
+"""A time of day whose milliseconds are cut off by a comma that also separates cells."""
 DAY = 86400.0
 
 
@@ -52,12 +52,12 @@ def decoded(path: Path) -> str:
             return data.decode("utf-16")
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        # Every byte means something in Latin-1; Windows' own signs differ in places no number uses.
+        # Every byte is valid in Latin-1; Windows-1252 differs only in characters that no number uses.
         return data.decode("latin-1")
 
 
 def cell(text: str, decimal: str) -> float | None:
-    """A cell's number; NaN where it says that there is none, None where it is something else."""
+    """Return the number in a cell, NaN for a missing value, None for anything else."""
     word = text.strip().strip('"').strip()
     if (match := THOUSANDS[decimal].fullmatch(word)) is not None:
         word = re.sub(r"[^0-9+-]", "", match[1]) + "." + match[2]
@@ -78,7 +78,7 @@ def cell(text: str, decimal: str) -> float | None:
 
 
 def moment(word: str) -> float | None:
-    """A date with time, as s since 1970; a time of day, as s since midnight."""
+    """Return a date with time in s since 1970, or a time of day in s since midnight."""
     if (match := OF_DAY.fullmatch(word)) is not None:
         seconds = float(f"{match[3]}.{match[4] or 0}") + 1e-3 * int(match[5] or 0)
         return 3600.0 * int(match[1]) + 60.0 * int(match[2]) + seconds
@@ -95,7 +95,8 @@ def moment(word: str) -> float | None:
 
 
 def clocks_whole(lines: Sequence[str]) -> Sequence[str]:
-    """Lines with a point before the milliseconds, where a comma cut every clock in two: the header has a cell less."""
+    """Return the lines with a point before the milliseconds if a comma splits every time: the header has one cell
+    fewer."""
     first = next((i for i, line in enumerate(lines) if IN_TWO.search(line)), 0)
     above = next((line for line in reversed(lines[:first]) if line.strip()), "")
     if not above or lines[first].count(",") != above.count(",") + 1:
@@ -107,7 +108,7 @@ def clocks_whole(lines: Sequence[str]) -> Sequence[str]:
 
 
 def over_midnight(values: Array, daily: bool | None) -> Array:
-    """A column; of times of day, those of the next day counted on."""
+    """Return a column; times of day continue after midnight."""
     if not daily:
         return np.ascontiguousarray(values)
     known = np.flatnonzero(np.isfinite(values))

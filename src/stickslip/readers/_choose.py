@@ -1,4 +1,4 @@
-"""Which column is which channel: what the user says, then a profile, then what names and units tell."""
+"""Assign columns to channels: by the user's mapping, then a profile, then names and units."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from stickslip.readers._units import in_its_case, may_be_unit, parse_unit, spell
 from stickslip.readers.table_columns import Column, Table
 
 MOTION = ("position", "velocity")
-"""Channels that say whether the axis turns or moves along a line."""
+"""Channels that show whether the axis is rotary or linear."""
 DEFINED = 3
 """`Name.sure` of a column whose format defines its channel."""
 AMBIGUOUS = {"grad": "is a degree in German and a gradian in English; say deg, or 0.9 deg for gradians"}
-"""Units that a file may have, and nobody should say."""
+"""Units that may occur in a file but are ambiguous in a mapping."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +32,11 @@ class Choice:
     column : str
         Its name in the file.
     unit : str
-        As written, or empty where nobody says it: then SI is taken.
+        As written; empty if unknown, and then SI.
     source : {"map", "profile", "file", "name", "drive", "assumed"}
-        Who says the unit: the user, a profile, the file beside the name, the name, a number of the drive's, nobody.
+        Source of the unit: the user, a profile, the file, the column name, a number of the drive, or none.
     side : {"", "motor", "load"}
-        The side of the gear it is measured on; empty where nobody says it.
+        Side of the gear where it is measured; empty if unknown.
     """
 
     role: str
@@ -47,7 +47,7 @@ class Choice:
 
 
 def parse_mapping(mapping: Mapping[str, str] | Sequence[str]) -> dict[str, str]:
-    """Channel to what fills it, from a mapping or from strings like "position=q_deg:deg".
+    """Return columns by channel, from a mapping or from strings like "position=q_deg:deg".
 
     Raises
     ------
@@ -128,12 +128,12 @@ def choose(table: Table, mapping: Mapping[str, str]) -> tuple[list[Choice], list
 
 
 def meant(table: Table, mapping: Mapping[str, str]) -> dict[str, str]:
-    """The mapping, where what is called a torque and has a unit of current is the current, which makes the torque.
+    """Return the mapping, in which a torque with a unit of current becomes the current that gives the torque.
 
     Raises
     ------
     InputError
-        If another column is the current at once.
+        If the mapping also names another column as current.
     """
     text = mapping.get("motor_torque", "none")
     if not _is_current(table, text):
@@ -148,7 +148,7 @@ def meant(table: Table, mapping: Mapping[str, str]) -> dict[str, str]:
 
 
 def _is_current(table: Table, text: str) -> bool:
-    """Whether a column as said has a unit of current: the one that is said, else its own."""
+    """Whether a mapped column has a unit of current: the mapped unit, else its own."""
     text = re.sub(r"@(motor|load)$", "", text)
     column, unit = _find(table, text), ""
     if column is None and ":" in text:
@@ -161,7 +161,7 @@ def _is_current(table: Table, text: str) -> bool:
 
 
 def _explicit(table: Table, role: str, text: str) -> Choice:
-    """What the user says: COLUMN, COLUMN:UNIT, with @load or @motor behind."""
+    """Return the user's choice: COLUMN or COLUMN:UNIT, with an optional @load or @motor."""
     side = ""
     if text not in _names_of(table) and (match := re.fullmatch(r"(.+)@(motor|load)", text)):
         text, side = match[1], match[2]
@@ -191,7 +191,7 @@ def _explicit(table: Table, role: str, text: str) -> Choice:
 
 
 def _absent(table: Table, name: str) -> str:
-    """That a column is not in the file, or holds nothing that can be read."""
+    """Return the message that a column is missing or cannot be read."""
     unread = next((n for n in table.unread if n.lower() == name.lower()), None)
     if unread is None:
         return f"the file has no column {name!r}; {suggestion(name, _names_of(table))}"
@@ -203,12 +203,12 @@ def _absent(table: Table, name: str) -> str:
 
 
 def _unit_of(column: Column) -> str:
-    """The unit that the file gives beside the name, where it is one."""
+    """Return the unit that the file states next to the name, if it is valid."""
     return column.unit if may_be_unit(column.unit) else ""
 
 
 def _name_of(column: Column) -> Name:
-    """Return what a column is, by its format, else by its name and unit."""
+    """Return the meaning of a column, by its format, else by its name and unit."""
     read = role_of(column.name, _unit_of(column))
     if not column.channel:
         return read
@@ -217,14 +217,14 @@ def _name_of(column: Column) -> Name:
 
 
 def _along_a_line(chosen: Mapping[str, Choice]) -> bool:
-    """Whether the motion that was found is one along a line."""
+    """Whether the motion found is linear."""
     units = [parse_unit(choice.unit) for role, choice in chosen.items() if role in MOTION]
     kinds = {unit.kind for unit in units if unit is not None}
     return bool(kinds) and kinds <= {"length", "velocity"}
 
 
 def _doubtful(column: Column) -> Finding:
-    """That F_N may be a force in newtons or a normal force."""
+    """Return the note that F_N may be a force in newtons or a normal force."""
     name = column.name
     return Finding(
         "note",
@@ -235,7 +235,7 @@ def _doubtful(column: Column) -> Finding:
 
 
 def _find(table: Table, name: str) -> Column | None:
-    """The column of that name, whatever its case."""
+    """Return the column of a name, ignoring case."""
     exact = [c for c in table.columns if c.name == name]
     found = exact or [c for c in table.columns if c.name.lower() == name.lower()]
     return found[0] if found else None
@@ -246,7 +246,7 @@ def _names_of(table: Table) -> list[str]:
 
 
 def _guessed(role: str, column: Column, name: Name) -> Choice:
-    """A choice with the unit that the file or the name tells, if it suits the channel."""
+    """Return a choice with the unit from the file or the name, if it suits the channel."""
     unit, source = (column.unit, "file") if may_be_unit(column.unit) else (name.unit, "name")
     unit = in_its_case(unit, KINDS[role])
     return Choice(role, column.name, unit, source if unit else "assumed", name.side)
@@ -255,7 +255,7 @@ def _guessed(role: str, column: Column, name: Name) -> Choice:
 def _pick(
     role: str, candidates: Sequence[Column], names: Mapping[str, Name], chosen: Mapping[str, Choice]
 ) -> tuple[Column | None, list[Finding]]:
-    """The best candidate, and what is to be said of the choice."""
+    """Return the best candidate and the findings about the choice."""
     if role == "load":
         unsure = [c for c in candidates if not names[c.name].unit]
         candidates = [c for c in candidates if names[c.name].unit]
@@ -313,8 +313,8 @@ def _pick(
 def _of_same_words(
     candidates: Sequence[Column], chosen: Mapping[str, Choice]
 ) -> tuple[Column, Choice] | None:
-    """Return the one of several alike columns that has the words of the motion or torque that is taken, and that one:
-    "right_vel" for "right_pos", not "left_vel"."""
+    """Return the candidate that shares words with the chosen motion or torque column, and that column: "right_vel" for
+    "right_pos", not "left_vel"."""
     own = [frozenset(words(c.name)) for c in candidates]
     common = own[0].intersection(*own[1:])
     for other in (chosen[role] for role in (*MAIN[1:], "current") if role in chosen):

@@ -1,4 +1,4 @@
-"""When the samples of a table were taken: its column of times, its stated rate, or the clocks of its columns."""
+"""Determine the sample times of a table: from its time column, its stated rate, or the clocks of its columns."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ RATES = (
 )
 
 COUNTERS, NEAR = (16, 24, 32), 4.0
-"""Bits of a counter of times, and steps by which it may miss the place where it would go on."""
+"""Bits of a time counter, and its tolerance at an overflow, in steps."""
 FIRST = ("position", "velocity", "motor_torque")
-"""Channels whose times are the record's, the first that is present."""
+"""Channels whose times become those of the record, in order of preference."""
 MOST_FILLED, UNEVEN, EVEN = 0.9, 0.5, 0.95
 """A column is sampled slower than the others if at most `MOST_FILLED` of the rows between its first and last value have
 one, and if `EVEN` of its steps are within `UNEVEN` of the median step. Lost samples are not evenly spaced."""
@@ -55,7 +55,7 @@ LONGEST_NAME = 60
 EFFORTS = {"motor_torque", "friction_torque", "sensor_torque", "current"}
 """Channels from which the torque at a constant velocity follows."""
 SAME = 0.01
-"""Part of a stated period by which a column of times may differ from it without a word."""
+"""Relative difference between a stated period and the time column that is not reported."""
 
 
 class NoTimes(InputError):
@@ -65,7 +65,7 @@ class NoTimes(InputError):
 def time_of(
     table: Table, by_role: dict[str, Choice], columns: dict[str, Column], sample_time: float | None
 ) -> tuple[Array, float, list[Finding]]:
-    """The record's time in s, what was taken off it, and what is to be said."""
+    """Return the record's times in s, the time subtracted from them, and findings."""
     found: list[Finding] = []
     first = next(
         (columns[by_role[r].column] for r in (*FIRST, *by_role) if r in by_role and r != "time"),
@@ -140,7 +140,7 @@ def _of_tool(table: Table) -> str:
 
 
 def _as_steady(by_role: Mapping[str, Choice]) -> str:
-    """Return what a table of steady points needs, to end an error; empty if this cannot be one."""
+    """Return the requirements of a table of steady points, to end an error; empty if this cannot be one."""
     if may_be_steady(by_role):
         return f"; a table of constant velocities and their torques is for {name_option('method', 'sliding')}"
     parts = {"velocity": "velocity" in by_role, "torque": bool(by_role.keys() & EFFORTS)}
@@ -164,7 +164,7 @@ def may_be_steady(by_role: Mapping[str, Choice]) -> bool:
 
 
 def _by_header(table: Table) -> str:
-    """The option that says the period, with the one that the header states."""
+    """Return the option for the period, with the value from the header."""
     if (found := stated_period(table.constants)) is None:
         return name_option("sample_time", "SECONDS")
     name, text, period = found
@@ -172,7 +172,7 @@ def _by_header(table: Table) -> str:
 
 
 def times_of(table: Table, choices: Sequence[Choice], sample_time: float | None) -> tuple[Array, float]:
-    """A table's times in s from their origin, and that origin in s.
+    """Return a table's times in s from their origin, and that origin in s.
 
     Raises
     ------
@@ -180,7 +180,7 @@ def times_of(table: Table, choices: Sequence[Choice], sample_time: float | None)
         If it has none.
     """
     columns = {c.name: c for c in table.columns}
-    # Any column tells how many samples there are, whatever it holds.
+    # Any column determines the number of samples.
     by_role = {c.role: c for c in choices} or {
         "position": Choice("position", table.columns[0].name, "", "assumed")
     }
@@ -195,8 +195,8 @@ def _some(table: Table) -> str:
 
 
 def _overruled(choice: Choice, time: Array, sample_time: float) -> list[Finding]:
-    """That a stated rate takes the place of a column of times that says another; nothing where both say the same, or
-    the column's unit is not known (a counter)."""
+    """Return the finding that a stated rate replaces a time column that differs; none if both agree or the unit of the
+    column is unknown (a counter)."""
     unit, rows = parse_unit(choice.unit), np.flatnonzero(np.isfinite(time))
     if unit is None or rows.size < 2:
         return []
@@ -219,7 +219,7 @@ def _overruled(choice: Choice, time: Array, sample_time: float) -> list[Finding]
 
 
 def _counted_on(time: Array, choice: Choice, found: list[Finding]) -> Array:
-    """Times of a counter that starts anew at a power of two, counted on; others as they are."""
+    """Unwrap the times of a counter that overflows at a power of two; return others unchanged."""
     known = np.flatnonzero(np.isfinite(time))
     ticks: Array = time[known]
     steps = np.diff(ticks)
@@ -241,7 +241,7 @@ def _counted_on(time: Array, choice: Choice, found: list[Finding]) -> Array:
 
 
 def _from_start(time: Array, factor: float, found: list[Finding]) -> tuple[Array, float, list[Finding]]:
-    """Times in s; large ones, such as dates, count from the first sample."""
+    """Return times in s; large ones, such as dates, from the first sample."""
     finite = time[np.isfinite(time)]
     origin = float(finite[0]) if finite.size else 0.0
     if abs(origin * factor) < 1e6:
@@ -299,7 +299,7 @@ def on_own_clocks(
 
 
 def _is_slower(values: Array, time: Array) -> bool:
-    """Whether a column is blank between samples at even times: other columns have more samples."""
+    """Whether a column is blank between evenly spaced samples, because other columns have more samples."""
     known = np.flatnonzero(np.isfinite(values) & np.isfinite(time))
     if known.size < 3 or known.size > MOST_FILLED * (known[-1] - known[0] + 1):
         return False
@@ -309,7 +309,7 @@ def _is_slower(values: Array, time: Array) -> bool:
 
 
 def on_clock(column: Column, time: Array, origin: float, role: str) -> tuple[Array, list[Finding]]:
-    """The column at the record's times."""
+    """Interpolate the column at the record's times."""
     if column.clock is None:
         if column.values.size != time.size:
             raise InputError(f"{role}: column {column.name!r} has {column.values.size} values, time has {time.size}; "

@@ -1,4 +1,4 @@
-"""Text tables in groups of columns: one column of times, then the values that were sampled at these times.
+"""Read text tables in groups of columns: a time column, then the values that were sampled at these times.
 
 TwinCAT Scope (Beckhoff TE13xx, export to CSV) and LabVIEW write rows of keys above the samples and repeat the key
 where a group starts: ``Name  ActPos  Name  ActVelo``. Other tools name the columns of times: ``Time  Force  Time
@@ -31,7 +31,7 @@ NAMES = ("name", "channel name", "channel", "signal", "symbolname")
 """Keys of the rows that name the channels; the first that is present counts."""
 UNITS = ("unit", "units", "y_unit_label", "einheit")
 OF_SCOPE = ("symbolname", "sampletime[ms]", "sampletime", "netid", "indexgroup", "symbolcomment", "data-type")
-"""Keys that TwinCAT Scope alone writes."""
+"""Keys that only TwinCAT Scope writes."""
 KEYS = frozenset(
     (
         *NAMES, *UNITS, *OF_SCOPE, "port", "indexoffset", "symbolbased", "variablesize", "offset", "scalefactor",
@@ -61,8 +61,8 @@ class Layout:
     width : int
         Columns.
     rows : mapping of str to list of str
-        A cell for every column, by the row's key in lower case. Groups in which a row has another number of cells than
-        columns are left blank.
+        One cell per column, by the row's key in lower case. A group is left blank if the number of cells does not match
+        its columns.
     first : int
         Index of the first line of samples.
     scope : bool
@@ -80,7 +80,7 @@ class Layout:
         """Return the cells of a line of samples."""
         if self.delimiter != " ":
             return _split(line, self.delimiter)
-        # A blank cell is a blank itself: two in a row with the separator behind it.
+        # A blank cell is a space: two in a row with the separator after it.
         cells = list[str]()
         for text in re.findall(r"[^ ]+(?: |$)|  | $", line):
             cells.append(text.strip())
@@ -125,7 +125,7 @@ def _sizes(keyed: Sequence[tuple[int, list[str]]], scope: bool) -> tuple[int, ..
         return sizes if count > 1 or scope or not known.isdisjoint(NAMES) else ()
     if not scope and (known.isdisjoint(NAMES) or known.isdisjoint(UNITS)):
         return ()
-    # A row "Name" above the channels' own names the project.
+    # A row "Name" above that of the channels names the project.
     channels = max((i for i, cells in keyed if _key(cells) in NAMES), default=0)
     one = Counter(sizes for i, cells in keyed if i >= channels and (sizes := _sizes_of(cells)) > (0,))
     return max(one, key=lambda sizes: (one[sizes], sizes), default=())
@@ -167,7 +167,7 @@ def _sizes_of(cells: Sequence[str]) -> tuple[int, ...]:
 
 
 def _aligned(cells: Sequence[str], sizes: Sequence[int]) -> list[str]:
-    """A row's cells, one a column; blank in groups for which it has another number of them."""
+    """Return a row's cells, one per column; blank in groups where their number does not match."""
     at = [j for j, text in enumerate(cells) if text.strip().lower() == _key(cells)]
     out = list[str]()
     for g, size in enumerate(sizes):
@@ -183,7 +183,8 @@ def _aligned(cells: Sequence[str], sizes: Sequence[int]) -> list[str]:
 
 
 def _joined(cells: Sequence[str]) -> list[str]:
-    """Cells, a unit's quantity with the unit before it: "dV (Voltage)" that a blank between cells cut in two."""
+    """Return the cells, with the quantity joined to the unit before it: "dV (Voltage)" that a space between cells cut
+    in two."""
     out = list[str]()
     for text in cells:
         if out and text.startswith("(") and text != "(None)":
@@ -205,7 +206,7 @@ def _key(cells: Sequence[str]) -> str:
 
 
 def _is_sample(cells: Sequence[str], starts: Sequence[int]) -> bool:
-    """Whether the cells of the columns of times are numbers, or signs for none, and at least one is a number."""
+    """Whether the cells of the time columns are numbers or missing values, and at least one is a number."""
     found = [cell(cells[j], ",") for j in starts if j < len(cells)]
     return None not in found and any(value is not None and not math.isnan(value) for value in found)
 
@@ -214,7 +215,7 @@ def _is_sample(cells: Sequence[str], starts: Sequence[int]) -> bool:
 
 
 def time_columns(header: Sequence[Sequence[str]], values: Array) -> tuple[int, ...]:
-    """The columns of times, by their names and values; empty if the table has one time for all."""
+    """Return the time columns, by their names and values; empty if all columns share one time."""
     width = values.shape[1]
     for row in reversed(header):
         names = [text.strip() for text in row[:width]]
@@ -228,7 +229,7 @@ def time_columns(header: Sequence[Sequence[str]], values: Array) -> tuple[int, .
 
 
 def _named_times(names: Sequence[str]) -> tuple[int, ...]:
-    """Return the columns called a time ("time2") or the time of something ("t_pos"), each with others behind."""
+    """Return the columns named as times ("time2", "t_pos") that have other columns after them."""
     plain = [role_of(n).role == "time" or bool(IN_TIME.fullmatch(n.lower())) for n in names]
     of_one = [bool(own := words(n)) and not TIME_WORDS.isdisjoint((own[0], own[-1])) for n in names]
     for timed in (plain, of_one):
@@ -239,7 +240,7 @@ def _named_times(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def _companions(names: Sequence[str]) -> tuple[int, ...]:
-    """Columns called the time of the one behind them: "ActPos Time", "ActPos"."""
+    """Return the columns named as the time of the next one: "ActPos Time", "ActPos"."""
     pairs = list(zip(names[::2], names[1::2], strict=False))
     for name, following in pairs:
         own, other = words(name), words(following)
@@ -253,7 +254,7 @@ def _companions(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def _are_clocks(values: Array, starts: Sequence[int]) -> bool:
-    """Whether no time goes back, and all cover a common part of the motion."""
+    """Whether no time decreases and all cover a common part of the motion."""
     spans = list[tuple[float, float]]()
     for j in starts:
         times = values[np.isfinite(values[:, j]), j]
@@ -308,7 +309,7 @@ def _later_starts(layout: Layout, times: dict[int, Array], findings: list[Findin
 def timed_columns(
     names: Sequence[str], units: Sequence[str], starts: Sequence[int], values: Array
 ) -> tuple[tuple[Column, ...], list[Finding]]:
-    """The columns of a table with several columns of times, each with its group's clock."""
+    """Return the columns of a table with several time columns, each with the clock of its group."""
     times, findings = dict[int, Array](), list[Finding]()
     for j in starts:
         unit = parse_unit(units[j] or role_of(names[j]).unit)
@@ -353,7 +354,7 @@ def _columns(
 
 
 def _names(layout: Layout) -> tuple[list[str], list[Finding]]:
-    """A name for every column, and that names were taken from another row, if they were."""
+    """Return a name for every column, and a finding if names come from another row."""
     rows = [(key, layout.rows[key]) for key in NAMES if key in layout.rows]
     names, findings = [""] * layout.width, list[Finding]()
     for j in range(layout.width):
@@ -416,7 +417,7 @@ def _step(ticks: Array) -> float:
 
 
 def _unit(text: str) -> str:
-    """A unit without the quantity behind it: "dV (Voltage)"."""
+    """Return a unit without the quantity after it: "dV (Voltage)"."""
     bare = re.sub(r"\s*\([^()]*\)$", "", text)
     return bare if may_be_unit(bare) or not may_be_unit(text) else text
 

@@ -1,4 +1,4 @@
-"""Nested data (structures, groups, lists of samples) laid out as columns and constants."""
+"""Flatten nested data (structures, groups, lists of samples) into columns and constants."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from stickslip.readers.table_columns import Column, Table
 
 MAX_DEPTH = 12
 MAX_WIDTH = 64
-"""A matrix with more columns than this is a picture or a map, not signals."""
+"""A matrix with more columns than this is an image or a map, not signals."""
 MAX_PARTS = 10 * MAX_COLUMNS
 """Groups, arrays and single values of a tree."""
 NAMES = ("name", "Name", "label", "blockName", "Label")
@@ -31,7 +31,7 @@ class _Layout:
     def __init__(self, source: Path | None) -> None:
         self._source = source
         self._within: set[int] = set()
-        """The containers around the value that is laid out, by identity."""
+        """The containers around the current value, by identity."""
         self._parts = 0
         self.columns: list[Column] = []
         self.constants: dict[str, float | str] = {}
@@ -39,7 +39,7 @@ class _Layout:
         self.unread: dict[str, str] = {}
 
     def walk(self, name: str, value: Any, depth: int = 0) -> None:
-        """Lay out one value under a name.
+        """Flatten one value under a name.
 
         Raises
         ------
@@ -132,12 +132,12 @@ class _Layout:
             self.walk(_join(name, str(i)), item, depth + 1)
 
     def _samples(self, name: str, samples: Sequence[Mapping[str, Any]]) -> None:
-        """A list of samples, each a mapping: one column a key."""
+        """Flatten a list of samples, each a mapping: one column per key."""
         flat = [_flat(sample) for sample in samples]
         keys = dict.fromkeys(key for sample in flat for key in sample)
         insist_on_columns(self._source or "log", len(keys))
         if self._source is not None:
-            # Samples that each have other keys make a table with far more cells than the file has numbers.
+            # If every sample has other keys, the table has far more cells than the file has numbers.
             insist_on_values(self._source, len(keys) * len(flat))
         for key in keys:
             values = [as_number(sample.get(key)) for sample in flat]
@@ -145,7 +145,7 @@ class _Layout:
             if all(math.isnan(v) for v in values) and words:
                 self.unread[key] = words[0][:30]
                 continue
-            # The list's own name says nothing about a signal.
+            # The name of the list does not describe a signal.
             self._add(Column(key, np.array(values), _unit_of(words)))
 
     def _array(self, name: str, value: np.ndarray[Any, Any], depth: int) -> None:
@@ -194,9 +194,9 @@ class _Layout:
 def table_of(
     format_name: str, tree: Any, source: Path | None = None, findings: Sequence[Finding] = ()
 ) -> Table:
-    """Lay out a tree of mappings, lists and arrays.
+    """Flatten a tree of mappings, lists and arrays.
 
-    Where two or more of its groups hold a time of their own, the columns of each get it as their clock.
+    If two or more of its groups have their own time, the columns of each group get it as their clock.
 
     Raises
     ------
@@ -244,7 +244,7 @@ def _labelled(sample: Mapping[str, Any]) -> bool:
 
 
 def _has_signals(sample: Mapping[str, Any]) -> bool:
-    """Whether a value of it is too long to be a vector within one sample."""
+    """Whether one of its values is too long for a vector within one sample."""
     lists: list[Any] = [v for v in sample.values() if isinstance(v, (list, np.ndarray))]
     return any(np.size(v) > MAX_WIDTH and np.ndim(v) > 0 for v in lists if not _is_uneven(v))
 
@@ -256,7 +256,7 @@ def _is_uneven(value: Any) -> bool:
 def _flat(
     sample: Mapping[str, Any], prefix: str = "", depth: int = 0, within: frozenset[int] = frozenset()
 ) -> dict[str, Any]:
-    """One sample without nesting: mappings joined by dots, vectors by [i]."""
+    """Return one sample without nesting: names of mappings joined by dots, elements of vectors as [i]."""
     out: dict[str, Any] = {}
     if id(sample) in within:
         raise InputError(f"log: {prefix!r} contains itself; give columns of plain numbers")
@@ -277,11 +277,11 @@ def _flat(
 
 
 def as_number(value: Any) -> float:
-    """One value as a float, that of a date in s since 1970; NaN where it is none."""
+    """Return a value as a float, a date in s since 1970; NaN for anything else."""
     if isinstance(value, (bool, int, float, np.number, np.bool_)):
         try:
             return float(cast("Any", value))
-        except OverflowError:  # a whole number that no float holds
+        except OverflowError:  # an integer beyond the range of floats
             return math.copysign(math.inf, 1 if cast("Any", value) > 0 else -1)
         except TypeError:
             return math.nan
@@ -295,13 +295,13 @@ def as_number(value: Any) -> float:
 
 
 def _unit_of(values: Sequence[Any]) -> str:
-    """Seconds if the first value is the text of a date or of a time of day; else no unit."""
+    """Return seconds if the first value is the text of a date or of a time of day, else no unit."""
     first = values[0] if values else None
     return "s" if isinstance(first, str) and moment(first.strip()) is not None else ""
 
 
 def as_numbers(values: Sequence[Any]) -> np.ndarray[Any, np.dtype[np.float64]] | None:
-    """A flat sequence as floats, NaN where an entry is none; None where no entry is a number."""
+    """Return a flat sequence as floats, with NaN for entries that are no numbers; None without any number."""
     numbers = np.array([as_number(v) for v in values], dtype=np.float64)
     return None if numbers.size and np.isnan(numbers).all() and not _all_nan(values) else numbers
 
@@ -311,7 +311,7 @@ def _all_nan(values: Sequence[Any]) -> bool:
 
 
 def _row(item: Any) -> np.ndarray[Any, np.dtype[np.float64]] | None:
-    """One row of a matrix written as lists."""
+    """Return one row of a matrix that is written as lists."""
     if isinstance(item, np.ndarray):
         array = cast("np.ndarray[Any, Any]", item)
         return _numeric(array) if array.ndim == 1 else None
@@ -321,7 +321,7 @@ def _row(item: Any) -> np.ndarray[Any, np.dtype[np.float64]] | None:
 
 
 def _numeric(value: np.ndarray[Any, Any]) -> np.ndarray[Any, np.dtype[np.float64]] | None:
-    """An array of numbers as floats; times of NumPy in s; None where it holds something else."""
+    """Return an array of numbers as floats, times of NumPy in s; None for anything else."""
     if value.dtype.kind in "biuf":
         return value.astype(np.float64)
     if value.dtype.kind in "mM":

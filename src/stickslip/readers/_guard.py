@@ -1,6 +1,6 @@
-"""Call a function in a process of its own, so that a C library that dies or never ends does not take the user's along.
+"""Call a function in a separate process, which a C library may crash or block without harm to the user's process.
 
-Costs a start of Python (0.2 to 0.3 s): for formats only whose library cannot be held against damaged files otherwise.
+Starting Python takes 0.2 to 0.3 s, so this is only for formats whose library cannot be protected in another way.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from stickslip.readers.limits import memory_for, size_of, too_large
 
 T = TypeVar("T")
 PATIENCE = 20.0
-"""s until reading a file is given up, and as much again for every 200 MB."""
+"""Time limit for reading a file, s; the same again for every 200 MB."""
 
 
 class Died(Exception):
-    """How the process ended without an answer."""
+    """The process ended without an answer."""
 
 
 def read_apart(function: Callable[..., T], path: Path, *more: Any, library: str) -> T:
@@ -32,7 +32,7 @@ def read_apart(function: Callable[..., T], path: Path, *more: Any, library: str)
     Raises
     ------
     InputError
-        If the function does, or the library takes more, or crashes.
+        If the function does, the library exceeds a limit, or it crashes.
     """
     size = size_of(path)
     try:
@@ -48,17 +48,17 @@ def read_apart(function: Callable[..., T], path: Path, *more: Any, library: str)
 
 
 def call(function: Callable[..., T], *arguments: Any, limit: float, memory: int = 0) -> T:
-    """``function(*arguments)``; what it raises is raised here.
+    """Return ``function(*arguments)``, or raise its exception.
 
     Parameters
     ----------
     function : callable
-        One with a name in an importable module, as are the arguments' types and the answer's.
+        Must be importable by name, like the types of its arguments and result.
     limit : float
         s, after which the process is ended.
     memory : int
-        Bytes that the process may hold (where the system can limit them), beyond which it raises `MemoryError`; 0 for
-        no limit.
+        Bytes that the process may allocate (if the system can limit them) before it raises `MemoryError`; 0 for no
+        limit.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def call(function: Callable[..., T], *arguments: Any, limit: float, memory: int 
     """
     if not sys.executable:  # Python inside another program
         return function(*arguments)
-    # The child finds what this process finds, wherever that came from.
+    # The child gets the import path of this process.
     paths = os.pathsep.join(p or os.getcwd() for p in sys.path)
     try:
         done = subprocess.run(
@@ -92,7 +92,7 @@ def call(function: Callable[..., T], *arguments: Any, limit: float, memory: int 
 def _serve() -> None:
     """Read the call from stdin, write its answer or its exception to stdout."""
     channel = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a library prints is no part of the answer
+    os.dup2(2, 1)  # output of a library must not mix with the answer
     function, arguments, memory = pickle.load(sys.stdin.buffer)
     try:
         if memory:

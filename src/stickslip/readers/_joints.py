@@ -1,7 +1,7 @@
-"""The axis or joint that a column belongs to, and which columns belong to the same one.
+"""Find the axis or joint of each column, and select columns of the same one.
 
-The log of a robot has a column for every joint, of each of its signals: `q[0]`, `q[1]`, `tau[0]`, `tau[1]`. Columns of
-different joints make no record.
+The log of a robot has each signal once per joint: `q[0]`, `q[1]`, `tau[0]`, `tau[1]`. Columns of different joints must
+not be combined.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from stickslip.readers._names import Name
 from stickslip.readers.table_columns import Array, Column
 
 MAIN = ("time", "position", "velocity", "motor_torque")
-"""Channels that must not be guessed between equals: the wrong one spoils every result."""
+"""Channels that are never chosen between equal candidates, because the wrong one spoils every result."""
 RATES = frozenset(("qd", "xd", "thetad", "phid"))
 """Symbols that are a rate in robotics (q, qd, qdd) and a reference in control (desired q)."""
 SECOND_RATES = frozenset(("qdd", "xdd", "thetadd", "phidd", "ddq", "qddot"))
 
 
 class Joints:
-    """The axis whose columns are taken.
+    """The selected axis.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Joints:
     def __init__(self, names: Mapping[str, Name]) -> None:
         self.names = names
         self.first: tuple[str, str] | None = None
-        """Channel and column that decided on the axis."""
+        """Channel and column that determined the axis."""
         self.plain: tuple[str, str] | None = None
         """Channel and column of the motion or torque whose name has no axis."""
         self.members: dict[str, set[str]] = {}
@@ -62,7 +62,7 @@ class Joints:
         return []
 
     def of_one_axis(self, role: str, candidates: list[Column]) -> tuple[list[Column], list[Finding]]:
-        """Return the candidates of the axis that is taken, and a finding if there are others or none is."""
+        """Return the candidates of the selected axis, and a finding if there are others or none."""
         axes = sorted({self.names[c.name].axis for c in candidates} - {""}, key=_order)
         if role == "time" or not axes:
             return candidates, []
@@ -115,7 +115,7 @@ def _order(axis: str) -> list[tuple[int, str]]:
 
 
 def listed_names(columns: Sequence[Column]) -> str:
-    """The names of up to four columns."""
+    """Return the names of up to four columns."""
     return ", ".join([repr(c.name) for c in columns[:4]] + (["..."] if len(columns) > 4 else []))
 
 
@@ -144,7 +144,7 @@ def with_rates(columns: Sequence[Column], names: dict[str, Name]) -> dict[str, N
 
 
 def _is_rate_of(column: Column, position: Column, time: Column | None) -> bool:
-    """Whether a column follows the change of the position, and does so closer than it follows the position itself."""
+    """Whether a column is closer to the derivative of the position than to the position itself."""
     q: Array = position.values
     t = time.values if time is not None else np.arange(q.size, dtype=np.float64)
     if not column.values.size == q.size == t.size or q.size < 3:

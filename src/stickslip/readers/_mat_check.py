@@ -1,8 +1,8 @@
-"""Whether the bytes of a MAT file (versions 5 to 7.2) follow its format, looked at before SciPy reads them.
+"""Check that the bytes of a MAT file (versions 5 to 7.2) follow the format before SciPy reads them.
 
-SciPy's reader is compiled and trusts what a file says of itself: a type that does not exist ends the whole process
-(a segmentation fault). Here every tag is held against The MathWorks, "MAT-File Format", chapter 1: the type exists, the
-bytes are in the file, the numbers are as many as the dimensions say.
+SciPy's reader is compiled and trusts the file: an invalid type ends the whole process with a segmentation fault. Here
+every tag is compared with The MathWorks, "MAT-File Format", chapter 1: the type exists, the bytes are in the file, and
+their number matches the dimensions.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ STEP = 2**24
 
 
 class Damaged(ValueError):
-    """What in the file breaks the format."""
+    """A violation of the format in the file."""
 
 
 @dataclass(frozen=True)
 class _Element:
-    """A data element: its type, where its bytes begin and end, where the next one begins."""
+    """A data element: its type, start and end of its bytes, start of the next one."""
 
     kind: int
     start: int
@@ -47,10 +47,10 @@ class _Bytes:
     data: memoryview
     order: str
     numbers: list[int]
-    """The count of numbers in the arrays that were checked, in one place"""
+    """Count of numbers in all arrays checked so far."""
 
     def element(self, at: int, end: int, padded: bool = True) -> _Element:
-        """The data element at a place, which must lie before `end`."""
+        """Return the data element at a position before `end`."""
         if at + 8 > end:
             raise Damaged(f"a data element is cut off at byte {at}")
         first, count = unpack_from(f"{self.order}II", self.data, at)
@@ -65,7 +65,7 @@ class _Bytes:
         return _Element(first, start, start + count, min(following, end))
 
     def of(self, kinds: tuple[int, ...], at: int, end: int) -> _Element:
-        """The data element at a place, of one of these types."""
+        """Return the data element at a position, of one of these types."""
         element = self.element(at, end)
         if element.kind not in kinds:
             raise Damaged(f"the data element at byte {at} has type {element.kind}, which cannot be there")
@@ -79,13 +79,12 @@ def check(content: bytes, insist_on_values: Callable[[int], None] = lambda _: No
     ----------
     content : bytes
     insist_on_values : callable
-        Refuses a count of numbers that is too large; called while variables are decompressed, and with the count of
-        the numbers in all arrays.
+        Refuses a count of numbers that is too large; called during decompression, and with the total count of numbers.
 
     Raises
     ------
     Damaged
-        What breaks it, and where.
+        Names the violation and its position.
     """
     if len(content) < HEADER:
         raise Damaged("it ends within its header")
@@ -128,7 +127,7 @@ def _inflated(packed: bytes, at: int, insist_on_values: Callable[[int], None]) -
 
 
 def _matrix(file: _Bytes, matrix: _Element, depth: int) -> None:
-    """An array of any class; those in cells and structures in turn."""
+    """Check an array of any class; recursive for cells and structures."""
     at, end = matrix.start, matrix.end
     if at == end:  # MATLAB's empty array
         return
@@ -153,9 +152,9 @@ def _matrix(file: _Bytes, matrix: _Element, depth: int) -> None:
     elif kind == CHAR:
         _numbers(file, at, end, TEXT, None)
     elif kind == SPARSE:
-        for _ in range(2):  # indices of rows, then where columns begin
+        for _ in range(2):  # row indices, then starts of columns
             at = _numbers(file, at, end, BYTES, None)
-        for _ in range(1 + complex_):  # MATLAB 7 calls bytes of truth values doubles here
+        for _ in range(1 + complex_):  # MATLAB 7 labels the bytes of logical values as doubles here
             at = file.of(tuple(BYTES), at, end).following
     elif kind in NUMERIC:
         file.numbers[0] += count
@@ -168,7 +167,7 @@ def _matrix(file: _Bytes, matrix: _Element, depth: int) -> None:
 
 
 def _count(file: _Bytes, dimensions: _Element) -> int:
-    """How many elements the dimensions make."""
+    """Return the number of elements from the dimensions."""
     length = dimensions.end - dimensions.start
     number = length // 4
     if length % 4 or not 1 <= number <= MAX_DIMENSIONS:
@@ -180,7 +179,7 @@ def _count(file: _Bytes, dimensions: _Element) -> int:
 
 
 def _numbers(file: _Bytes, at: int, end: int, types: dict[int, int], count: int | None) -> int:
-    """An element of numbers, as many as told; returns where the next one begins."""
+    """Check an element with a given count of numbers; return the start of the next one."""
     element = file.of(tuple(types), at, end)
     width, length = types[element.kind], element.end - element.start
     if length % width or (count is not None and length // width != count):
@@ -215,7 +214,7 @@ def _structure(file: _Bytes, at: int, end: int, kind: int, count: int, depth: in
 
 
 def _opaque(file: _Bytes, at: int, end: int, depth: int) -> None:
-    """An object of a class: three names, then an array."""
+    """Check an object of a class: three names, then an array."""
     for _ in range(3):
         at = file.of((INT8, UTF8), at, end).following
     _arrays(file, at, end, 1, depth)

@@ -1,8 +1,8 @@
-"""What a column's name says: its quantity, its unit, its axis and its side.
+"""Parse column names: quantity, unit, axis and side of the gear.
 
 English, German, the main words in French, Italian and Spanish, and the names drives and controllers use (CiA 402
-objects, TwinCAT, Sinamics, Sercos, Logix, AKD, ODrive, Dynamixel, ROS). A name is cut into words; a role is known by
-one of its words or by its whole spelling.
+objects, TwinCAT, Sinamics, Sercos, Logix, AKD, ODrive, Dynamixel, ROS). A name is split into words; its role follows
+from one of its words or from the whole name.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "load": ("force", "torque", "share"),
     "temperature": ("temperature",),
 }
-"""The channels a file can fill, and the kinds of unit each may have; the first is meant where none is given."""
+"""Channels that a file can have, and the kinds of unit of each; the first is the default."""
 
 ROLES = tuple(KINDS)
 
@@ -73,14 +73,14 @@ ALIASES = {
 
 IN_BRACKETS = re.compile(r"[\[(<{]\s*([^\])>}]{1,24}?)\s*[\])>}]")
 INDEX = re.compile(r"\[\s*(\d{1,3})\s*\]|\(\s*(\d{1,3})\s*\)")
-"""The index of a column: a whole number alone in brackets is no unit."""
+"""The index of a column: an integer alone in brackets is not a unit."""
 OF_AXIS = re.compile(r"(joint|axis|achse|gelenk|motor|drive|servo|actuator|axe|eje|j|a|m)(\d{1,2})")
 LETTERED = re.compile(r"(?i)(?:axis|achse|axe|eje)[ _.-]?([a-hx-z])(?=[^a-z0-9]+[a-z])")
-"""An axis's letter, and a quantity behind it: "Axis A Position", but not "axis.fActPos"."""
+"""The letter of an axis, followed by a quantity: "Axis A Position", but not "axis.fActPos"."""
 AFTER_IN = re.compile(r"\s+in\s+(\S{1,12})\s*$|\s*[/,]\s*(\S{1,12})\s*$", re.IGNORECASE)
 CAMEL = re.compile(r"(?<=[a-zäöüß])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 IN_GROUP = re.compile(r"^/(?:\w+/)*|^.*[|]|^\w+(?:\.\w+)*\.(?=[^\W\d])")
-"""The groups before a signal's own name: "state.tau_J", "/motor_state/torque"."""
+"""Groups before the name of a signal: "state.tau_J", "/motor_state/torque"."""
 PIECES = re.compile(r"[_\s]+")
 WORD_ENDS = re.compile(rf"{PIECES.pattern}|{CAMEL.pattern}")
 NUMBERED = re.compile(r"\d{1,2}")
@@ -102,14 +102,14 @@ UMLAUTS = str.maketrans(
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """What a column's name says.
+    """A parsed column name.
 
     Attributes
     ----------
     role : str
-        A channel, or empty where none is recognised.
+        A channel; empty if none is recognised.
     sure : int
-        2 a whole name, 1 a word among others, 0 a command that may stand for what is measured, or nothing.
+        2: a whole name; 1: a word among others; 0: a command that may replace a measurement, or nothing.
     unit : str
         The unit written in the name, or empty.
     axis : str
@@ -128,14 +128,14 @@ class Name:
 
 
 def words(name: str) -> list[str]:
-    """The words of a name: at signs, at capitals and between letters and digits, in lower case."""
+    """Split a name at signs, at capitals and between letters and digits, in lower case."""
     cut = CAMEL.sub(" ", name).lower().translate(UMLAUTS)
     plain = "".join(c for c in unicodedata.normalize("NFKD", cut) if not unicodedata.combining(c))
     return [w for w in re.split(r"[^0-9a-z]+", plain) if w]
 
 
 def role_of(name: str, unit: str = "") -> Name:
-    """Read a column's name; `unit` is the unit that the file gives besides."""
+    """Parse a column's name; `unit` is the unit that the file states separately."""
     bare, stated, parts, axis = _pieces(name, unit)
     family = " ".join(parts) + ("[]" if INDEX.search(name) else "")
     own = words(IN_GROUP.sub("", INDEX.sub("", name)))
@@ -156,21 +156,21 @@ def role_of(name: str, unit: str = "") -> Name:
 
 
 def _is_of_joint(parts: list[str], axis: str) -> bool:
-    """Whether a name may be about an axis or joint: the pose of a hand and the forces on it are not."""
+    """Whether a name may belong to an axis or joint: pose and forces of an end effector do not."""
     # The cart of a pendulum has one position, a Cartesian one has several.
     cartesian = "cart" in parts and (axis or parts[-1] in ("x", "y", "z"))
     return "joint" in parts or (CARTESIAN.isdisjoint(parts) and not cartesian)
 
 
 def commanded(name: str) -> bool:
-    """Whether a name says that what it names is commanded, not measured."""
+    """Whether a name marks a commanded, not a measured, quantity."""
     return not OF_REFERENCE.isdisjoint(words(name))
 
 
 def motor_force(name: str, unit: str = "") -> Name | None:
-    """The motor's force by its symbol, as in "F [N]" or "F_motor [N]"; None where name and unit do not say so.
+    """Return the motor's force by its symbol, as in "F [N]" or "F_motor [N]"; None if name and unit do not match.
 
-    Only an axis along a line has one: elsewhere F is another force.
+    Only a linear axis has one: elsewhere F is another force.
     """
     _, stated, parts, axis = _pieces(name, unit)
     parsed = parse_unit(stated)
@@ -182,7 +182,7 @@ def motor_force(name: str, unit: str = "") -> Name | None:
 
 
 def _pieces(name: str, unit: str) -> tuple[str, str, list[str], str]:
-    """A name without its unit, the unit, the name's words, and the number of its axis."""
+    """Return a name without its unit, the unit, the words of the name, and the number of its axis."""
     indices = [first or second for first, second in INDEX.findall(name)]
     bare, inner = _without_unit(INDEX.sub("", name))
     if not unit and not inner and not _whole(bare):
@@ -219,7 +219,7 @@ def _numbered_axis(parts: list[str]) -> str:
 
 
 def _without_tail(bare: str) -> tuple[str, str]:
-    """A unit after the last underscore or blank, as a last word, or before what was done with the quantity: "q_deg",
+    """Split off a unit after the last underscore or space, as a last word, or before a qualifier: "q_deg",
     "omega_rad_s", "torqueNm", "torque_Nm_filtered", "pos_deg_2"."""
     bare = PER.sub("/", bare)
     for cut, alone in ((PIECES, True), (WORD_ENDS, False)):
@@ -235,14 +235,14 @@ def _without_tail(bare: str) -> tuple[str, str]:
                 continue
             head = "_".join([*pieces[:-count], *behind])
             role, unit = _role(head, words(head))[0], parse_unit(tail)
-            # A last word may be one of the name's, where nothing else says what it is.
+            # The last word may be part of the name if nothing else identifies the quantity.
             if (alone and unit and role in ("", "motor_torque")) or (role and in_its_case(tail, KINDS[role])):
                 return head, tail
     return bare, ""
 
 
 def _without_unit(name: str) -> tuple[str, str]:
-    """The name without the unit in it, and the unit."""
+    """Return the name without its unit, and the unit."""
     for match in reversed(list(IN_BRACKETS.finditer(name))):
         if may_be_unit(match[1]) and not match[1].isdigit():
             return (name[: match.start()] + " " + name[match.end() :]).strip(), match[1]
@@ -257,7 +257,7 @@ def _without_unit(name: str) -> tuple[str, str]:
 
 
 def _whole(bare: str) -> str:
-    """The role that a whole spelling, or its last part after a dot, names."""
+    """Return the role of a whole name, or of its last part after a dot."""
     spelled = bare.lower().translate(UMLAUTS).strip().replace(" ", "_")
     last = re.split(r"[./|:]", spelled)[-1]
     code = re.search(r"(?:0x|index_?)?(60[0-9a-f]{2})h?(?::\w+)?$", spelled)
@@ -273,7 +273,7 @@ def _aliases(role: str) -> tuple[str, ...]:
 
 
 def _role(bare: str, parts: list[str]) -> tuple[str, int]:
-    """The quantity that a name speaks of, and how surely."""
+    """Return the quantity of a name, and how certain it is."""
     if role := _whole(bare):
         return role, 2
     is_reference = not OF_REFERENCE.isdisjoint(parts)
@@ -283,7 +283,7 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
     if found == ["motor_torque"] and not SENSOR.isdisjoint(parts) and MOTOR_SIDE.isdisjoint(parts):
         return "sensor_torque", 1
     if "load" in found and len(found) > 1:
-        found.remove("load")  # "load position" is a position on the load's side
+        found.remove("load")  # "load position" is a position on the load side
     if {"supply", "current"} <= set(found):
         return "", 0  # the supply's current is not the motor's
     for one in ("friction_torque", "supply"):
@@ -302,7 +302,7 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
     if len(found) > 1:
         found = [r for r in found if r != "time"] or found
     if not found:
-        # A short name with a word around it: "q act", "ist n".
+        # A short name with a qualifier: "q act", "ist n".
         rest = [
             w
             for w in parts
@@ -331,7 +331,8 @@ def _role(bare: str, parts: list[str]) -> tuple[str, int]:
 
 
 def _compound(parts: list[str]) -> str:
-    """What a German compound ends in: "Spindelposition", "Vorschubkraft"; empty for a load's, friction's or none."""
+    """Return the role of a German compound by its ending: "Spindelposition", "Vorschubkraft"; empty for load, friction
+    or none."""
     for word in parts:
         for end, role in COMPOUNDS.items():
             if word.endswith(end) and not word.startswith(OTHER_COMPOUNDS):
@@ -340,7 +341,7 @@ def _compound(parts: list[str]) -> str:
 
 
 def _role_by_unit(parts: list[str], unit: Unit) -> str:
-    """What an unknown name with a telling unit must be; empty where the unit tells too little."""
+    """Return the role of an unknown name if its unit determines it, else an empty string."""
     if not OF_REFERENCE.isdisjoint(parts):
         return "motor_torque" if unit.kind == "torque" else ""
     return {"angular velocity": "velocity", "electrical speed": "velocity", "torque": "motor_torque",

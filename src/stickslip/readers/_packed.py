@@ -1,4 +1,4 @@
-"""Packed samples: the layout that the declarations of a struct or message state, and its values as columns."""
+"""Unpack binary samples: the layout from the declarations of a struct or message, and its values as columns."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from stickslip.finding import Finding
 from stickslip.readers.table_columns import Array, Column
 
 DEPTH = 8
-"""Levels of structs in structs."""
+"""Levels of nested structs."""
 MAX_ELEMENTS = 1024
-"""Values of one sample: an array with more is a picture, not signals."""
+"""Values of one sample: a larger array is an image, not signals."""
 
 Member = tuple[str, str]
 """Suffix of the column, and type of NumPy."""
@@ -25,7 +25,7 @@ class Damaged(ValueError):
 
 
 def cut_off(at: int, size: int) -> Finding:
-    """Return the warning about a file that ends within a record, which starts at byte `at`."""
+    """Return the warning about a file that ends within a record that starts at byte `at`."""
     message = f"the file is cut off after {at} of {size} bytes; what comes before was read"
     return Finding("warning", "cut-off", message, remedy="download it again if it was copied")
 
@@ -41,7 +41,7 @@ def members_of(
     declared : mapping of str to str
         By struct: the declarations of its members, with a semicolon between them.
     pattern : Pattern
-        Of a declaration, with the groups ``kind``, ``member`` and ``count``.
+        Matches a declaration; has the groups ``kind``, ``member`` and ``count``.
     types : mapping of str to str
         Types of NumPy by those of the format.
     depth : int
@@ -74,7 +74,7 @@ def dtype_of(members: Sequence[Member]) -> np.dtype[Any]:
 def columns_of(
     name: str, members: Sequence[Member], rows: Any, clock: Array, unit: str = "", channel: str = ""
 ) -> list[Column]:
-    """Return the numbers of samples as columns; texts are left out."""
+    """Return the numbers in samples as columns; texts are skipped."""
     return [
         Column(name + suffix, rows[f"f{i}"].astype(np.float64), unit, clock, channel)
         for i, (suffix, code) in enumerate(members)

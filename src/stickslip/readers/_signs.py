@@ -1,4 +1,4 @@
-"""Points and commas in one table of text: which of them is the decimal sign, and which stands between thousands."""
+"""Decide which of point and comma is the decimal sign of a text table, and which separates thousands."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from stickslip.finding import Finding
 SIGNS = (".", ",")
 NUMBER = re.compile(r"[-+]?[\d.,]*\d[\d.,]*(?:[eE][-+]?\d+)?")
 GROUPS = {s: re.compile(rf"[-+]?[1-9]\d{{0,2}}(?:{re.escape(s)}\d{{3}})+") for s in SIGNS}
-"""Whole numbers with a sign between their thousands; one with a single sign may have three decimals, too."""
+"""Integers with thousands separators; with a single sign it may also be a number with three decimals."""
 
 
 @dataclass
 class _Seen:
-    """What the cells of a column show of a sign: the first in which it is the decimal sign, and the first in which it
-    may stand between thousands, or does."""
+    """Evidence about a sign in a column: the first cell in which it is the decimal sign, and the first in which it may
+    be or is a thousands separator."""
 
     decimal: dict[str, str] = field(default_factory=dict[str, str])
     maybe: dict[str, str] = field(default_factory=dict[str, str])
     between: dict[str, str] = field(default_factory=dict[str, str])
     beside: set[str] = field(default_factory=set[str])
-    """Signs that stand between thousands in a cell with the other, as its decimal sign: that cell tells itself."""
+    """Thousands separators in cells that also have the other sign as decimal sign, so these cells are unambiguous."""
 
     def look(self, text: str) -> None:
         """Take a cell into account."""
@@ -49,10 +49,10 @@ class _Seen:
 def between_thousands(
     rows: Iterable[Sequence[str]], width: int, words: Set[int]
 ) -> tuple[dict[int, str], list[Finding]]:
-    """The columns with a sign between thousands, by index, and what is to be said of them.
+    """Return the columns with thousands separators, by index, and findings.
 
-    Points and commas are not both decimal signs: where one of them certainly is in some cell, the other stands between
-    thousands wherever every cell can be read so. A column whose cells cannot is left as it is.
+    Only one of point and comma is the decimal sign. If one of them certainly is in some cell, the other separates
+    thousands in every column whose cells all allow it; other columns are unchanged.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ def between_thousands(
     width : int
         Columns.
     words : set of int
-        Columns that hold words.
+        Columns with words.
 
     Raises
     ------
     InputError
-        If nothing tells the two apart.
+        If the two cannot be distinguished.
     """
     seen = [_Seen() for _ in range(width)]
     for row in rows:

@@ -1,4 +1,4 @@
-"""The sampling period that lines above a table state, such as ``Sampling Rate:,8,Milli-Seconds``."""
+"""Find the sampling period in the lines above a table, such as ``Sampling Rate:,8,Milli-Seconds``."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ SAYS = re.compile(
     r"(?:period|rate|interval|cycle|frequency|periode|intervall|frequenz|takt|zyklus)"
     r"|(?:sampling|sample|abtast)(?:time|zeit)"
 )
-"""Keys of such a line, their letters alone in lower case: a trace's or a measurement's time is how long it took."""
+"""Keys of such a line, letters only, in lower case. The time of a trace or measurement is its duration, so it is not
+one."""
 AMOUNT = re.compile(r"([0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*([A-Za-zµμ][A-Za-zµμ -]*)")
 HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
 
@@ -25,7 +26,7 @@ def is_period(text: str) -> bool:
 
 
 def stated_period(constants: Mapping[str, float | str]) -> tuple[str, str, float] | None:
-    """Key, value as written, and the period in s that it states; None where no line states one with its unit."""
+    """Return key, value as written, and the period in s; None if no line states one with its unit."""
     for name, value in constants.items():
         key = re.sub(r"[^a-zäöü]", "", IN_BRACKETS.sub("", name.rsplit(".", 1)[-1]).lower())
         if not SAYS.fullmatch(key):
@@ -39,7 +40,7 @@ def stated_period(constants: Mapping[str, float | str]) -> tuple[str, str, float
 
 
 def _seconds(text: str) -> float:
-    """The period that a text such as "8 ms" or "1 kHz" states; NaN where it states none."""
+    """Return the period in s of a text such as "8 ms" or "1 kHz"; NaN if there is none."""
     match = AMOUNT.fullmatch(text.strip())
     amount = float(match[1].replace(",", ".")) if match is not None else 0.0
     if match is None or not amount > 0.0:

@@ -1,7 +1,7 @@
-"""The JSON files of WPILib's SysId and of its predecessor frc-characterization: four tests of one mechanism.
+"""Read the JSON files of WPILib's SysId and its predecessor frc-characterization: four tests of one mechanism.
 
 Format: SysId, "Data Collection". A test is a list of rows: time (s), motor voltage (V), position (rotations of the
-output) and velocity (rotations/s); of a drivetrain with left and right sides. frc-characterization adds the battery's
+output) and velocity (rotations/s); for a drivetrain of the left and right side. frc-characterization adds the battery's
 voltage and the commanded speed.
 """
 
@@ -35,7 +35,7 @@ LAYOUTS = {
         MECHANISM[0], ("battery_voltage", "V", "supply"), ("autospeed", "", NONE), *SIDES, ("gyro_angle", "", NONE),
     ),
 }  # fmt: skip
-"""Name, unit and channel of every column, by the count of columns; the side of a drivetrain is the user's choice."""
+"""Name, unit and channel of every column, by the number of columns; the user chooses the side of a drivetrain."""
 
 
 def is_sysid(tree: Any) -> bool:
@@ -47,12 +47,12 @@ def is_sysid(tree: Any) -> bool:
 
 
 def table_of_tests(path: Path, tree: Mapping[str, Any]) -> Table:
-    """The tests one after the other, in the order in which they were recorded.
+    """Return the tests one after the other, in the order of recording.
 
     Raises
     ------
     InputError
-        If a test is no table of 4, 9 or 10 columns.
+        If a test is not a table of 4, 9 or 10 columns.
     """
     tests = {name: _rows(path, name, tree[name]) for name in TESTS if isinstance(tree.get(name), list)}
     tests = {name: rows for name, rows in tests.items() if len(rows)}
@@ -103,7 +103,7 @@ def _rows(path: Path, name: str, given: Sequence[Any]) -> Array:
 
 
 def _with_signed_voltages(tests: dict[str, Array], names: Sequence[str]) -> list[Finding]:
-    """Invert, in place, voltages that a test records without their sign: in each test the motor drives throughout."""
+    """Invert, in place, voltages that a test records without their sign: the motor drives throughout each test."""
     inverted: list[str] = []
     for test, rows in tests.items():
         for name in names:

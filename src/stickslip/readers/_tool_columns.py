@@ -1,5 +1,5 @@
-"""Columns of well-known tools whose names mean something else than their words: VESC Tool, UR's RTDE, LeRobot,
-ODrive, moteus, SINAMICS."""
+"""Interpret columns of known tools whose meaning differs from their names: VESC Tool, UR's RTDE, LeRobot, ODrive,
+moteus, SINAMICS."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class Tool:
     has : tuple of str
         Regular expressions; a table is this tool's if each of them matches a column.
     columns : tuple of (str, str, str)
-        Regular expression of a name, channel ("none" for what is no channel of an axis, "" for what the name
-        indicates) and unit; the first that matches applies.
+        Regular expression of a name, channel ("none": not a channel of an axis; "": the one that the name indicates)
+        and unit; the first match applies.
     notes : tuple of (str, str, str)
-        Regular expression of a name, and what to report if a column matches: message and remedy.
+        Regular expression of a name, and the message and remedy to report if a column matches.
     run : str
-        The column whose value changes where another record starts.
+        The column whose value changes at the start of another record.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Tool:
 JOINT = r"[_\[]?\d\]?"
 """Number of a joint at the end of a name."""
 GROUP, INDEXED = r"(?:.*[.:/])?", r"(?:\[\d+\])?"
-"""What may be before a signal's name and after it."""
+"""Text that may be before and after a signal's name."""
 TOOLS = (
     Tool(
         "VESC Tool",
@@ -156,7 +156,7 @@ TOOLS = (
 
 
 def with_tool(table: Table) -> Table:
-    """The table with the channels and units that its tool defines; as it is if no known tool wrote it."""
+    """Return the table with the channels and units that its tool defines; unchanged if no known tool wrote it."""
     names = [column.name for column in table.columns]
     tool = next((t for t in TOOLS if all(_first(pattern, names) for pattern in t.has)), None)
     if tool is None:

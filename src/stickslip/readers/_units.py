@@ -1,4 +1,4 @@
-"""Units as people and machines write them, and what one of them is in SI."""
+"""Parse units as people and machines write them, and convert them to SI."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SI = {
     "voltage": "V", "temperature": "°C", "share": "1", "counts": "counts", "count rate": "counts/s",
     "electrical speed": "rad/s",
 }  # fmt: skip
-"""The unit of each kind of quantity in a record. Temperatures are in °C, as in `Surroundings`."""
+"""Unit of each kind of quantity in a record. Temperatures are in °C, as in `Surroundings`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ PLAIN: dict[str, Unit] = {
          "digit", "digits"),
         Unit("counts"),
     ),
-    # Speeds that are no quotient
+    # Speeds that are not quotients
     **dict.fromkeys(("rpm", "upm", "1/min", "min-1", "u/min", "rev/min", "r/min", "umdr/min", "turn/min", "turns/min"),
                     Unit("angular velocity", TURN / 60)),
     **dict.fromkeys(("rps", "rev/s", "u/s", "r/s", "turn/s", "turns/s", "umdr/s", "revs/s"),
@@ -57,7 +57,7 @@ PLAIN: dict[str, Unit] = {
     "krpm": Unit("angular velocity", TURN / 60 * 1e3), "mrpm": Unit("angular velocity", TURN / 60 * 1e-3),
     "erpm": Unit("electrical speed", TURN / 60),
     "dps": Unit("angular velocity", TURN / 360), "rads-1": Unit("angular velocity"),
-    # Torques and forces that are not metric
+    # Non-metric torques and forces
     "lbin": Unit("torque", POUND_FORCE * INCH), "lbfin": Unit("torque", POUND_FORCE * INCH),
     "inlb": Unit("torque", POUND_FORCE * INCH), "inlbf": Unit("torque", POUND_FORCE * INCH),
     "lbft": Unit("torque", POUND_FORCE * INCH * 12), "lbfft": Unit("torque", POUND_FORCE * INCH * 12),
@@ -68,7 +68,7 @@ PLAIN: dict[str, Unit] = {
     "gfcm": Unit("torque", POND * 1e-2), "kgm": Unit("torque", POND * 1e3), "kgfm": Unit("torque", POND * 1e3),
     "lbf": Unit("force", POUND_FORCE), "lb": Unit("force", POUND_FORCE), "kgf": Unit("force", POND * 1e3),
     "gf": Unit("force", POND), "kp": Unit("force", POND * 1e3),
-    # Lengths that are not metric
+    # Non-metric lengths
     "in": Unit("length", INCH), "inch": Unit("length", INCH), "inches": Unit("length", INCH),
     "ft": Unit("length", INCH * 12), "micron": Unit("length", 1e-6), "microns": Unit("length", 1e-6),
     # Times
@@ -88,13 +88,13 @@ PLAIN: dict[str, Unit] = {
     **dict.fromkeys(("degc", "celsius", "c"), Unit("temperature")),
     **dict.fromkeys(("k", "kelvin", "degk"), Unit("temperature", 1.0, -273.15)),
     **dict.fromkeys(("degf", "fahrenheit", "f"), Unit("temperature", 5 / 9, -160 / 9)),
-    # Shares of a rated value
+    # Fractions of a rated value
     **dict.fromkeys(("%", "percent", "prozent", "pct", "perc", "%rated"), Unit("share", 1e-2)),
     **dict.fromkeys(("‰", "permille", "permill", "promille", "0.1%", "1/1000", "%o", "permil", "perthousand"),
                     Unit("share", 1e-3)),
     **dict.fromkeys(("1", "pu", "p.u.", "share"), Unit("share")),
 }  # fmt: skip
-"""Spellings without prefix, as `_normal` leaves them; lower case unless the case matters."""
+"""Spellings without prefix, as returned by `_normal`; lower case unless the case matters."""
 
 PREFIXES = {"": 1.0, "p": 1e-12, "n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6}
 PREFIXED = {
@@ -103,7 +103,7 @@ PREFIXED = {
 }  # fmt: skip
 EVERY = {prefix + base: replace(unit, factor=unit.factor * scale)
          for base, unit in PREFIXED.items() for prefix, scale in PREFIXES.items()}  # fmt: skip
-# N·mm is a torque in another order: the prefix sits at the metre.
+# N·mm is a torque whose prefix is at the metre.
 TURNED_AROUND = {
     f"{a}N{b}m": Unit("torque", PREFIXES[a] * PREFIXES[b]) for a in PREFIXES for b in ("u", "m", "c", "k")
 }
@@ -112,19 +112,19 @@ CASELESS = {
     written.lower(): written
     for written in ("Nm", "mNm", "uNm", "kNm", "cNm", "Ncm", "Nmm", "mN", "kN", "mA", "uA", "mV", "kV")
 }
-"""Units as they are written, by what is left of them in a name or a header that has one case throughout."""
+"""Units as they are written, by their form in a name or header with one case throughout."""
 RATES = {"angle": "angular velocity", "length": "velocity", "counts": "count rate"}
 SECOND_RATES = {"angle": "angular acceleration", "length": "acceleration"}
 OF_SOMETHING = re.compile(r"%[A-Za-z_]{1,24}")
-"""A share of what is rated: "% In", "% of rated torque"."""
+"""A fraction of a rated value: "% In", "% of rated torque"."""
 NUMBER = re.compile(r"([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*\*?\s*(.+)")
 
 
 def parse_unit(text: str) -> Unit | None:
-    """What a unit as written is in SI, or None where it is none.
+    """Return the SI conversion of a unit as written, or None if it is not a unit.
 
-    A number may stand before it, and a minus that turns the sign: "0.25 um" is a count of a quarter of a
-    micrometre, "-Nm" a torque that is positive the other way; "--Nm" is none.
+    It may have a factor and a minus sign: "0.25 um" is a count of a quarter of a micrometre, "-Nm" a torque with
+    inverted sign; "--Nm" is invalid.
     """
     written = text.strip()
     if not written or len(written) > 40:
@@ -145,8 +145,8 @@ def parse_unit(text: str) -> Unit | None:
 
 
 def in_its_case(text: str, kinds: tuple[str, ...]) -> str:
-    """A unit of one of these kinds as it is written, whatever its case ("NM" of a torque, which is a nanometre of a
-    length), or empty."""
+    """Return a unit of one of these kinds in its correct case ("NM" is N·m for a torque, but nm for a length), or
+    empty."""
     for written in (text, CASELESS.get(_normal(text).lower(), "")):
         unit = parse_unit(written)
         if unit is not None and unit.kind in kinds:
@@ -155,12 +155,12 @@ def in_its_case(text: str, kinds: tuple[str, ...]) -> str:
 
 
 def may_be_unit(text: str) -> bool:
-    """Whether this is a unit, or one whose case is lost."""
+    """Whether this is a unit, possibly with the wrong case."""
     return parse_unit(text) is not None or _normal(text).lower() in CASELESS
 
 
 def spellings(kinds: tuple[str, ...]) -> str:
-    """The usual units of some kinds, for messages."""
+    """Return the usual units of some kinds, for messages."""
     usual = {
         "time": "s, ms, us", "angle": "rad, deg, rev", "length": "m, mm, um", "angular velocity": "rad/s, deg/s, rpm",
         "velocity": "m/s, mm/s", "torque": "Nm, mNm, Nmm", "force": "N, mN", "current": "A, mA", "voltage": "V, mV",
@@ -171,7 +171,7 @@ def spellings(kinds: tuple[str, ...]) -> str:
 
 
 def _normal(text: str) -> str:
-    """One spelling for the signs: no spaces and multiplication dots, u for micro, deg for the ring."""
+    """Return a normal form: no spaces or multiplication dots, u for micro, deg for °."""
     for old, new in (
         ("µ", "u"),
         ("μ", "u"),
@@ -188,7 +188,7 @@ def _normal(text: str) -> str:
 
 
 def _plain(text: str) -> Unit | None:
-    """The unit of a normalised spelling: as it stands, then in lower case."""
+    """Return the unit of a normal form: as it is, then in lower case."""
     for candidate in (text, text.lower()):
         if candidate in METRIC:
             return METRIC[candidate]
@@ -200,7 +200,7 @@ def _plain(text: str) -> Unit | None:
 
 
 def _quotient(text: str) -> Unit | None:
-    """A rate: something per second, minute or second squared."""
+    """Parse a rate: per second, minute or second squared."""
     match = re.fullmatch(r"(.+?)(?:/(s2|s/s|sec2|s|sec|min|ms|msec)|(s-2|s-1))", text)
     if match is None:
         return None

@@ -1,10 +1,10 @@
-"""The words in which drives' tools, robots and people name the columns of their logs."""
+"""Words used by drive tools, robots and people for the columns of their logs."""
 
 from __future__ import annotations
 
 
 def _table(text: str) -> dict[str, tuple[str, ...]]:
-    """A mapping from "key: word word ..." lines; indented lines go on."""
+    """Parse "key: word word ..." lines into a mapping; indented lines continue."""
     out: dict[str, tuple[str, ...]] = {}
     key = ""
     for word in text.split():
@@ -83,10 +83,10 @@ OF_REFERENCE = _words(
     vorgabe vsoll ziel consigne momentsollwert positionssollwert riferimento
     """
 )
-"""Words that say that a quantity is a reference, not measured."""
+"""Words for a reference, as opposed to a measurement."""
 
 NAMED_BY_UNIT = frozenset(["sec", "secs", "ms", "msec", "millis", "rpm", "erpm"])
-"""Names of a time or a speed that are its unit. A bare "s" may as well be a displacement (and does not beat a "t")."""
+"""Times and speeds named by their unit. A bare "s" may also be a displacement (and has lower priority than "t")."""
 ERROR = frozenset(["deviation", "diff", "err", "error", "fehler", "following", "lag"])
 LOAD_SIDE = frozenset(
     [
@@ -106,7 +106,7 @@ LOAD_SIDE = frozenset(
 FORCE = frozenset(["force", "kraft"])
 SENSOR = frozenset(["sensor", "kraftsensor", "kraftaufnehmer"])
 FORCE_SYMBOL = frozenset(["f", "fm", "fmot", "fmotor"])
-"""The force's symbol: a frequency, a friction and a normal force have it too."""
+"""The symbol of a force, also used for a frequency, friction and normal force."""
 MOTOR_SIDE = frozenset(["antrieb", "drive", "mot", "motor", "motorseitig", "rotor"])
 SKIP = _words(
     """
@@ -120,22 +120,22 @@ NO_SIGNAL = _words(
     """
 )
 CARTESIAN = _words("ee eef tcp effector endeffector wrench pose flange cartesian kartesisch xyz")
-"""Words of a robot's hand in space: its position is no joint's angle, the force on it no joint's torque."""
+"""Words for a robot's end effector: its position is not a joint angle, its force not a joint torque."""
 OF_OTHERS = _words("ext external extern contact gravity coriolis disturbance")
-"""Words of torques that are not the motor's."""
+"""Words for torques other than the motor's."""
 AXES = _words("joint axis achse gelenk motor drive servo actuator axe eje")
-"""Words that an axis's number follows."""
+"""Words followed by the number of an axis."""
 CHANNELS = _words("ch channel kanal ai ao adc col column signal trace")
-"""Words whose number is a channel of the instrument, not an axis."""
+"""Words followed by a channel number of the instrument, not an axis."""
 NO_TAIL = frozenset(
     ["1", "a", "c", "f", "h", "i", "in", "k", "kp", "lb", "m", "min", "n", "p", "u", "v", "x"]
 )
-"""Units that are more often something else at the end of a name."""
+"""Units that usually mean something else at the end of a name."""
 COMPOUNDS = {
     "position": "position", "winkel": "position", "geschwindigkeit": "velocity", "drehzahl": "velocity",
     "moment": "motor_torque", "kraft": "motor_torque", "strom": "current", "temperatur": "temperature",
 }  # fmt: skip
-"""Ends of German compounds, and the quantity that such a word names."""
+"""Endings of German compounds, and their quantity."""
 OTHER_COMPOUNDS = (
     "last",
     "reib",
@@ -149,7 +149,7 @@ OTHER_COMPOUNDS = (
     "brems",
     "soll",
 )
-"""Beginnings of those that name another torque or force, or what is asked for."""
+"""Beginnings of compounds for another torque or force, or for a reference."""
 REFERENCED = {
     "position": "position_reference",
     "velocity": "velocity_reference",

@@ -1,7 +1,7 @@
-"""Traces of CODESYS V3 and of controllers built on it, such as Bosch ctrlX, saved as CSV.
+"""Read CSV traces of CODESYS V3 and of controllers based on it, such as Bosch ctrlX.
 
-Lines of key and value, then a block for each variable: ``0.Variable; GVL.fPosAct``, more keys, ``0.Data;``, and a line
-``; time; value`` for each sample. Each variable has its own times.
+Lines of key and value are followed by a block for each variable: ``0.Variable; GVL.fPosAct``, more keys, ``0.Data;``,
+and a line ``; time; value`` for each sample. Each variable has its own times.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ DATA = re.compile(r"(\d+)\.data")
 OF_FLAGS = {0x20: (1e-6, "us"), 0x10: (1e-3, "ms")}
 """Bits of the line Flags that state the unit of the times."""
 SLOWEST = 200.0
-"""A step of the times beyond this is in us: no task of a motion runs at less than 5 Hz."""
+"""A larger step of the times is in us: no motion task runs slower than 5 Hz."""
 
 
 @dataclass
 class _Block:
-    """Samples of a variable."""
+    """The samples of a variable."""
 
     name: str
     line: int
@@ -40,13 +40,13 @@ class _Block:
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """Whether the header of such a trace, or the block of its first variable, starts the file."""
+    """Whether the file starts with the header of such a trace or the block of its first variable."""
     text = head.decode("utf-16" if head[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig", "replace")
     return HEADER.match(text) is not None or BLOCK.search(text) is not None
 
 
 def read(path: Path) -> Table:
-    """Read the variables of the trace, each with its own clock."""
+    """Read the variables of the trace, each with its own times."""
     text = decoded(path)
     found = HEADER.match(text) or BLOCK.search(text)
     blocks, constants = _blocks(path, text.splitlines(), found[1] if found else ";")
@@ -99,7 +99,7 @@ def _blocks(path: Path, lines: list[str], separator: str) -> tuple[list[_Block],
 
 
 def _sample(path: Path, blocks: list[_Block], number: int, rest: str, separator: str) -> None:
-    """Add the sample "time; value" to the last block; after a time that goes back a new recording starts."""
+    """Add the sample "time; value" to the last block; a time that decreases starts a new recording."""
     moment, _, text = (part.strip() for part in rest.partition(separator))
     time, value = cell(moment, ","), cell(text, ",")
     if not blocks or time is None or np.isnan(time):

@@ -1,4 +1,4 @@
-"""From columns as written to a record in SI units, every step of it named in the record's meta."""
+"""Convert columns to a record in SI units; every step is listed in the record's meta."""
 
 from __future__ import annotations
 
@@ -48,21 +48,22 @@ NUMBERS = (
     "counts_per_rev", "rated_torque", "rated_current", "torque_constant", "force_constant", "gear_ratio", "lead",
     "pole_pairs",
 )  # fmt: skip
-"""What a drive's data sheet says, each a positive number."""
+"""Numbers from a drive's data sheet, all positive."""
 TURNING = ("torque_constant", "lead", "gear_ratio")
-"""What only a motor that turns has: a linear one has `force_constant` in their place."""
+"""Numbers of rotary motors only; a linear one has `force_constant` instead."""
 LONGEST_LEAD = 1.6
-"""m a revolution, of a drum of half a metre: a lead in millimetres is more, but for the finest screws."""
+"""m per revolution, of a drum with a diameter of half a metre. A lead given in mm is larger, except for the finest
+screws."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """What the drive's data sheet says and a file does not. NaN where nobody says it.
+    """Numbers from the drive's data sheet that a file does not contain; NaN if unknown.
 
     Attributes
     ----------
     counts_per_rev : float
-        Encoder counts a revolution (4 x lines where the drive counts every edge).
+        Encoder counts per revolution (4 x lines if the drive counts every edge).
     rated_torque : float
         N·m (or N), for torques in percent or per mille.
     rated_current : float
@@ -70,16 +71,16 @@ class Drive:
     torque_constant : float
         N·m/A, for torque = current x torque constant.
     force_constant : float
-        N/A, the same of a linear motor, which has neither lead nor gear.
+        N/A, for a linear motor, which has neither lead nor gear.
     gear_ratio : float
-        Revolutions of the motor for one of the load.
+        Motor revolutions per load revolution.
     side : {"motor", "load"}
-        The side of the gear that the record is about: what was measured on the other one is converted.
+        Side of the gear that the record describes; signals of the other side are converted.
     lead : float
-        m that a linear axis moves for one revolution: a screw's lead, a pinion's or pulley's circumference. Where a
-        record has both lengths and torques (angles and forces), all becomes lengths and forces.
+        Travel of a linear axis per revolution, m: a screw's lead, a pinion's or pulley's circumference. If a record has
+        both lengths and torques (angles and forces), all are converted to lengths and forces.
     pole_pairs : float
-        Electrical revolutions for one of the motor, for speeds in electrical revolutions a minute (eRPM).
+        Electrical revolutions per motor revolution, for speeds in electrical revolutions per minute (eRPM).
     """
 
     counts_per_rev: float = math.nan
@@ -112,7 +113,7 @@ class Drive:
             raise InputError(f"side = {self.side!r} is not known; choose from motor, load")
 
     def known(self) -> dict[str, Any]:
-        """What is given, as plain data."""
+        """Return the given numbers as plain data."""
         return {k: v for k, v in asdict(self).items() if not (isinstance(v, float) and math.isnan(v))}
 
 
@@ -125,15 +126,15 @@ def convert(
     *,
     steady: bool = False,
 ) -> Record:
-    """Make the record.
+    """Return the record.
 
-    With `steady`, rows without times, of a velocity and a torque, are steady points: their times are 0, and
-    `steady_points` of ``meta["reading"]`` is true.
+    With `steady`, rows of velocity and torque without times are steady points: their times are 0, and `steady_points`
+    of ``meta["reading"]`` is true.
 
     Raises
     ------
     InputError
-        If there is no time, a conversion needs a number that nobody gave, or columns differ in length.
+        If there is no time, a conversion needs a number that is missing, or columns differ in length.
     """
     said = list(findings)
     by_role = {choice.role: choice for choice in choices}
@@ -178,7 +179,7 @@ def convert(
 
 
 def _entry(choice: Choice, unit: str) -> dict[str, Any]:
-    """What a record says of a column that it was made of; `unit` is the one that nobody stated."""
+    """Return the entry of a column in the record's meta; `unit` is an assumed one."""
     entry: dict[str, Any] = {
         "channel": choice.role, "column": choice.column, "unit": choice.unit or unit, "source": choice.source,
     }  # fmt: skip
@@ -190,7 +191,7 @@ def _entry(choice: Choice, unit: str) -> dict[str, Any]:
 def _reading(
     table: Table, listed: Sequence[dict[str, Any]], drive: Drive, origin: float, said: Sequence[Finding]
 ) -> dict[str, Any]:
-    """What a record says of how it was read."""
+    """Return the entry ``reading`` of the record's meta."""
     used = {entry["column"] for entry in listed}
     unused = [c for c in table.columns if c.name not in used]
     return {
@@ -210,7 +211,7 @@ def _reading(
 
 
 def _drives(column: Column) -> bool:
-    """Whether a column may say what drives the axis: its unit is one of torque, force, current or a share."""
+    """Whether a column may be the drive signal: its unit is that of a torque, force, current or a fraction."""
     if column.channel:
         return False
     unit = column.unit if parse_unit(column.unit) else role_of(column.name).unit
@@ -219,14 +220,14 @@ def _drives(column: Column) -> bool:
 
 
 def is_linear(by_role: dict[str, Choice]) -> bool:
-    """Whether the axis moves along a line: a length, a linear velocity or a force is stated."""
+    """Whether the axis is linear: a length, a linear velocity or a force is stated."""
     stated = [parse_unit(c.unit) for c in by_role.values() if c.unit and c.role in (*MOTION, *EFFORT)]
     kinds = [u.kind for u in stated if u is not None]
     return any(k in ("length", "velocity", "acceleration", "force") for k in kinds) and "angle" not in kinds
 
 
 def unit_of(choice: Choice, linear: bool) -> Unit:
-    """The unit that a column is read in: the stated one, or SI where nobody states one."""
+    """Return the unit in which a column is read: the stated one, or SI."""
     if (unit := parse_unit(choice.unit)) is not None:
         return unit
     kind = KINDS[choice.role][0]
@@ -234,7 +235,7 @@ def unit_of(choice: Choice, linear: bool) -> Unit:
 
 
 def _scale(choice: Choice, unit: Unit, drive: Drive) -> tuple[float, str, list[str]]:
-    """Factor to SI on the record's side of the gear, the SI unit, and the steps in words."""
+    """Return the factor to SI on the record's side of the gear, the SI unit, and the steps as text."""
     kind, factor, steps = unit.kind, unit.factor, list[str]()
     if kind in ("counts", "count rate"):
         per_rev = _needed(
@@ -292,7 +293,7 @@ def _needed(value: float, choice: Choice, what: str, option: str, other: str = "
 def _one_kind(
     channels: dict[str, Array], units: dict[str, str], listed: list[dict[str, Any]], drive: Drive
 ) -> list[Finding]:
-    """Lengths and torques (angles and forces) in one record: with the lead all is made lengths and forces in place."""
+    """Convert a record with lengths and torques (angles and forces) to lengths and forces in place, with the lead."""
     turning = [
         c for c in channels if (c in MOTION and "rad" in units[c]) or (c in EFFORT and units[c] == "N·m")
     ]
@@ -316,7 +317,7 @@ def _one_kind(
                 f"{name_columns(motor_torque=unit)}"
             )
         return [Finding(level, "mixed-units", message, remedy=remedy)]
-    # What turns is on the motor's side, unless its gear has been allowed for.
+    # Rotary signals are on the motor side, unless the gear ratio has been applied.
     geared = any(_steps_of(entry, "gear ratio") for entry in listed)
     way = drive.lead / (1.0 if geared else _ratio_or_one(drive)) / (2.0 * math.pi)
     for entry in listed:
@@ -331,13 +332,13 @@ def _one_kind(
 
 
 def _steps_of(entry: Mapping[str, Any], word: str) -> bool:
-    """Whether a step by which a column was converted says this."""
+    """Whether a conversion step of a column contains this text."""
     return any(word in step for step in entry.get("steps", ()))
 
 
 def _idle_numbers(listed: Sequence[dict[str, Any]], drive: Drive) -> list[Finding]:
-    """That a rated torque, a rated current or a lead converts nothing; of a share that states no unit the doctor
-    speaks."""
+    """Return findings on a rated torque, rated current or lead that converts nothing. The doctor reports fractions
+    without a unit."""
     out: list[Finding] = []
     ratings = (("motor_torque", drive.rated_torque, "torque"), ("current", drive.rated_current, "current"))
     for channel, value, what in ratings:
@@ -357,7 +358,8 @@ def _idle_numbers(listed: Sequence[dict[str, Any]], drive: Drive) -> list[Findin
 
 
 def _idle_gear(listed: Sequence[dict[str, Any]], drive: Drive) -> list[Finding]:
-    """That a gear ratio converts nothing, since every signal was taken as measured on the motor's side."""
+    """Return the finding that a gear ratio converts nothing, because all signals are taken as those of the motor
+    side."""
     moved = [e for e in listed if e["channel"] in (*MOTION, *EFFORT)]
     used = drive.side == "load" or not math.isnan(drive.lead) or any(e["side"] == "load" for e in moved)
     if math.isnan(drive.gear_ratio) or used:
@@ -372,8 +374,10 @@ def _idle_gear(listed: Sequence[dict[str, Any]], drive: Drive) -> list[Finding]:
 
 
 def pendulum_before_gear(record: Record, told: str) -> list[Finding]:
-    """That a pendulum behind a gear is about the load's angle, and the record about the motor's; `told` is what tells
-    of the pendulum. Empty where it is not so."""
+    """Return the finding that a pendulum depends on the load's angle while the record has the motor's; else nothing.
+
+    `told` describes the pendulum in the message.
+    """
     drive: dict[str, Any] = record.meta.get("reading", {}).get("drive", {})
     ratio = float(drive.get("gear_ratio", 1.0))
     if ratio == 1.0 or drive.get("side", "motor") == "load" or record.units.get("position") != "rad":
@@ -392,7 +396,7 @@ def pendulum_before_gear(record: Record, told: str) -> list[Finding]:
 def _force_from_current(
     channels: dict[str, Array], units: dict[str, str], constant: float, along: bool
 ) -> dict[str, str]:
-    """Force = current x force constant, of an axis that moves along a line."""
+    """Add the force of a linear axis: current x force constant."""
     if not along:
         raise InputError(
             f"{name_option('force_constant', f'{constant:g}')} is a linear motor's, and the record's positions "
@@ -406,7 +410,7 @@ def _force_from_current(
 def _torque_from_current(
     channels: dict[str, Array], units: dict[str, str], drive: Drive, linear: bool
 ) -> tuple[dict[str, str], list[Finding]]:
-    """Torque = current x torque constant, where a current and a constant are given and no torque."""
+    """Add the torque, current x torque constant, if a current and a constant are given and no torque."""
     known = not (math.isnan(drive.torque_constant) and math.isnan(drive.force_constant))
     if "motor_torque" in channels or "current" not in channels or not known:
         return {}, []

@@ -1,4 +1,5 @@
-"""Text tables: delimiter, decimal comma, header and units are sniffed; TwinCAT Scope's time and value columns too."""
+"""Read text tables: delimiter, decimal comma, header and units are detected, as are TwinCAT Scope's time and value
+columns."""
 
 from __future__ import annotations
 
@@ -36,13 +37,13 @@ DIALECTS = (
     (" ", ","),
     (",", ","),
 )
-"""Delimiter and decimal sign, in the order in which ties are decided; a comma is both where cells stand in quotes."""
+"""Delimiter and decimal sign, in order of preference; a comma may be both if cells are in quotes."""
 SAMPLE = 400
-"""Lines from which the dialect is told."""
+"""Lines from which the dialect is detected."""
 SAMPLED, FEWEST = 2_000_000, 20
-"""Characters of these lines, and the lines that are used however long they are."""
+"""Characters of these lines, and number of lines that are used at any length."""
 USUAL = 0.8
-"""Part of the lines of a sample in which a column of numbers holds one: header and footer are the rest"""
+"""Share of the lines in which a numeric column has a number; the rest are header and footer"""
 IN_SECONDS = re.compile(r"^([-+.\deE]+) sec(?=[,;\t])")
 """A duration in the first cell, as MATLAB writes timetables."""
 LABELLED = re.compile(
@@ -55,17 +56,17 @@ COMMENT = re.compile(r"^\s*(?:#|%|//|!)+\s*")
 
 @dataclass(frozen=True)
 class Dialect:
-    """How the lines are cut, and where the data begin."""
+    """How lines are split, and where the data start."""
 
     delimiter: str
     decimal: str
     width: int
     start: int
     words: frozenset[int] = frozenset()
-    """Columns that hold words, such as the state of the drive"""
+    """Columns of words, such as the state of the drive"""
 
     def split(self, line: str) -> list[str]:
-        """The cells of a line."""
+        """Return the cells of a line."""
         if self.delimiter == " ":
             return line.split()
         if '"' in line:
@@ -77,7 +78,7 @@ class Dialect:
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """Text: what no other format claims and has no binary zeros (UTF-16 has, after its mark)."""
+    """Accept text: any file that no other format claims and that has no binary zeros (except UTF-16 after its mark)."""
     return bool(head) and (head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" not in head)
 
 
@@ -130,9 +131,9 @@ def _in_groups(path: Path, lines: Sequence[str], layout: Layout) -> Table:
 
 
 def _padded(body: Sequence[Sequence[str]], dialect: Dialect) -> Array | None:
-    """Return the cells as numbers, NaN where they are blank or absent; None if any may be something else."""
+    """Return the cells as numbers, NaN if blank or absent; None if any may be something else."""
     decimal, other = dialect.decimal, {".": ",", ",": "."}[dialect.decimal]
-    if any(other in c for row in body for c in row):  # between thousands
+    if any(other in c for row in body for c in row):  # a thousands separator
         return None
     none = ["nan"] * dialect.width
     text = [
@@ -172,7 +173,7 @@ def _plain(path: Path, lines: Sequence[str]) -> Table:
         return Table("csv", columns, constants, tuple(findings))
     if values.shape[1] and np.isnan(values[:, -1]).all() and not names[-1]:
         values = values[:, :-1]  # a delimiter ends every line
-    # A column of dates is the time whatever its name, unless another is called so.
+    # A column of dates is the time whatever its name, unless another column is named time.
     only = clocks if len(clocks) == 1 and not any(role_of(name).role == "time" for name in names) else {}
     columns = tuple(
         Column(
@@ -196,7 +197,7 @@ def _left_out(unread: Mapping[str, str]) -> Finding:
 
 
 def _unread(names: Sequence[str], body: Sequence[str], dialect: Dialect) -> dict[str, str]:
-    """Name and first cell of the columns that hold words."""
+    """Return name and first cell of the columns of words."""
     first = dialect.split(body[0]) if body else []
     return {
         names[i] or f"column {i + 1}": first[i].strip()[:30] for i in sorted(dialect.words) if i < len(first)
@@ -221,7 +222,7 @@ def _without_labels(lines: list[str]) -> list[str]:
 
 
 def _insist_on_short_lines(path: Path, lines: Sequence[str]) -> None:
-    """Refuse lines that are no row of a table.
+    """Refuse lines that are too long for a row of a table.
 
     Raises
     ------
@@ -236,7 +237,7 @@ def _insist_on_short_lines(path: Path, lines: Sequence[str]) -> None:
 
 
 def _sniff(lines: Sequence[str]) -> Dialect:
-    """The dialect under which most lines of a sample are rows of numbers of one width."""
+    """Return the dialect in which most of the first lines are rows of numbers of equal width."""
     filled = [(i, line) for i, line in enumerate(lines) if line.strip()]
     longest = max((len(line) for _, line in filled), default=0)
     count = min(SAMPLE, max(FEWEST, SAMPLED // (longest + 1)))
@@ -249,7 +250,7 @@ def _sniff(lines: Sequence[str]) -> Dialect:
         if not any(rows):
             continue
         width, explained = _width(cut, rows)
-        # A second column is worth more than the last few rows.
+        # A second column counts more than the last few rows.
         merit = explained * min(width, 3)
         if merit > score * 1.001:
             best, score = Dialect(delimiter, decimal, width, 0), merit
@@ -303,7 +304,7 @@ def _width(cut: Sequence[Sequence[str]], rows: Sequence[bool]) -> tuple[int, int
 def _sniff_among_words(
     filled: Sequence[tuple[int, str]], sample: Sequence[tuple[int, str]]
 ) -> Dialect | None:
-    """The dialect under which at least two columns hold numbers, and others words, in nearly every line."""
+    """Return the dialect in which at least two columns have numbers, and others words, in nearly every line."""
     best, score = None, 0
     for delimiter, decimal in DIALECTS:
         trial = Dialect(delimiter, decimal, 0, 0)
@@ -321,7 +322,7 @@ def _sniff_among_words(
 
 
 def _numbers_where_due(dialect: Dialect, line: str) -> bool:
-    """Whether a line has numbers, or signs for none, in every column that does not hold words."""
+    """Whether a line has numbers or missing values in every column that is not one of words."""
     cells = dialect.split(line)
     found = [cell(text, dialect.decimal) for j, text in enumerate(cells) if j not in dialect.words]
     return len(cells) == dialect.width and None not in found and any(map(_is_number, found))
@@ -332,7 +333,7 @@ def _is_number(value: float | None) -> bool:
 
 
 def _is_row(cells: Sequence[str], decimal: str) -> bool:
-    """Whether a cell is a number, and no other is a word."""
+    """Whether at least one cell is a number and none is a word."""
     found = [cell(text, decimal) for text in cells]
     return None not in found and any(map(_is_number, found))
 
@@ -340,8 +341,8 @@ def _is_row(cells: Sequence[str], decimal: str) -> bool:
 def _without_headers(
     body: list[str], above: Sequence[str], dialect: Dialect
 ) -> tuple[list[str], list[Finding]]:
-    """The rows without the lines of the header that stand again among them, as in files that were put together."""
-    # Empty cells and signs for none above the first number are samples: without a clock their number counts.
+    """Return the rows without repeated header lines, as in concatenated files."""
+    # Missing values above the first number are samples: without a clock their number matters.
     known = {
         line.strip() for line in above if None in [cell(c, dialect.decimal) for c in dialect.split(line)]
     }
@@ -357,7 +358,7 @@ def _without_headers(
 
 
 def _without_footer(body: list[str], dialect: Dialect) -> tuple[list[str], list[Finding]]:
-    """The rows without the words that end some exports."""
+    """Return the rows without the text at the end of some exports."""
     end = len(body)
     while end and all(cell(c, dialect.decimal) is None for c in dialect.split(body[end - 1]) if c.strip()):
         end -= 1
@@ -376,19 +377,19 @@ def _without_footer(body: list[str], dialect: Dialect) -> tuple[list[str], list[
 
 
 def _clocks(body: Sequence[str], dialect: Dialect) -> dict[int, bool]:
-    """Columns of dates or times of day, told by their first cell, and whether they start anew with the day."""
+    """Return columns of dates or times of day, by their first cell, and whether they restart at midnight."""
     first = [c.strip().strip('"').strip() for c in dialect.split(body[0])] if body else []
     told = {i: bool(OF_DAY.fullmatch(c)) for i, c in enumerate(first) if ":" in c and moment(c) is not None}
     return {i: daily for i, daily in told.items() if i not in dialect.words}
 
 
 def _values(body: Sequence[str], dialect: Dialect) -> tuple[Array, list[Finding]]:
-    """The rows as numbers, shape (n, width); NaN where a cell holds none.
+    """Return the rows as numbers, shape (n, width); NaN for cells without one.
 
     Raises
     ------
     InputError
-        If points and commas both stand in it, and nothing tells which of them is the decimal sign.
+        If it has both points and commas, and the decimal sign cannot be determined.
     """
     if dialect.decimal == "," and any("." in line for line in body):
         cells = (dialect.split(line) for line in body)
@@ -413,7 +414,7 @@ def _values(body: Sequence[str], dialect: Dialect) -> tuple[Array, list[Finding]
 def _values_one_by_one(
     body: Sequence[str], dialect: Dialect, between: Mapping[int, str] | None = None
 ) -> tuple[Array, list[Finding]]:
-    """Cell by cell; `between` has the sign between the thousands of some columns."""
+    """Parse cell by cell; `between` has the thousands separators of some columns."""
     between = between or {}
     values = np.full((len(body), dialect.width), np.nan)
     short, long, words = list[int](), list[int](), list[tuple[int, int, str]]()
@@ -422,7 +423,7 @@ def _values_one_by_one(
         if len(cells) < dialect.width:
             short.append(i)
             if dialect.delimiter == " ":
-                continue  # which cells are missing cannot be known
+                continue  # it is unknown which cells are missing
         elif any(c.strip() for c in cells[dialect.width :]):
             long.append(i)
         for j, text in enumerate(cells[: dialect.width]):
@@ -461,7 +462,7 @@ def _values_one_by_one(
 
 
 def _names(header: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[str]]:
-    """Names and units of the columns, from the last header rows of about that width."""
+    """Return names and units of the columns, from the last header rows of about that width."""
     rows = [[c.strip().strip('"').strip() for c in row] for row in header]
     rows = [row if any(row[width:]) else row[: max(width, 1)] for row in rows]
     rows = [
@@ -483,7 +484,7 @@ def _names(header: Sequence[Sequence[str]], width: int) -> tuple[list[str], list
 def _without_increments(
     header: Sequence[Sequence[str]], dialect: Dialect
 ) -> tuple[list[Sequence[str]], dict[str, float | str]]:
-    """Take the numbers out of the row below the names, as oscilloscopes write them: "X,CH1,Increment" above
+    """Remove the numbers from the row below the names, as written by oscilloscopes: "X,CH1,Increment" above
     "Sequence,Volt,2e-3"."""
     rows = list(header)
     if len(rows) < 2:
@@ -506,12 +507,12 @@ def _without_increments(
 def _beside_numbers(
     header: Sequence[Sequence[str]], values: Array, dialect: Dialect
 ) -> tuple[list[Sequence[str]], list[Finding]]:
-    """Return the header, its names moved by one if the first column has none since it numbers or labels the rows.
+    """Return the header; its names move by one if the first column numbers or labels the rows and has no name.
 
     Raises
     ------
     InputError
-        If the names are one fewer than the columns, and it is not known which has none.
+        If there is one name fewer than columns, and it is unknown which column has none.
     """
     rows, width = list(header), dialect.width
     short = [i for i, row in enumerate(rows) if len(row) == width - 1 and any(role_of(c).role for c in row)]
@@ -532,7 +533,7 @@ def _beside_numbers(
 
 
 def _all_units(row: Sequence[str]) -> bool:
-    """Whether a row holds nothing but units (or signs for none), and at least one."""
+    """Whether a row has only units or blanks, and at least one unit."""
     told = [_bare(c) for c in row]
     real = [c for c in told if c not in ("", "-", "1")]
     return bool(real) and all(may_be_unit(c) for c in real)
@@ -556,7 +557,7 @@ def _distinct(names: Sequence[str]) -> list[str]:
 
 
 def _constants(header: Sequence[Sequence[str]], dialect: Dialect) -> dict[str, float | str]:
-    """Lines like "key: value" above the table."""
+    """Return the lines like "key: value" above the table."""
     out: dict[str, float | str] = {}
     for row in header:
         cells = [c.strip() for c in row if c.strip()]

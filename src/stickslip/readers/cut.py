@@ -1,6 +1,6 @@
-"""Which part of a record is looked at: from a time to a time, rows, rows left out; and positions counted on.
+"""Select a part of a record (times, rows, rows left out), and unwrap positions.
 
-Rows count the samples of the file from 1. What was kept is in ``record.meta["reading"]["kept_rows"]``.
+Rows count the samples of the file from 1. The rows kept are in ``record.meta["reading"]["kept_rows"]``.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from stickslip.record import Record, encoder_step
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BRIDGED = 4
-"""Rows that may be left out without cutting the record in two: what filters is interpolated across them."""
+"""Rows that may be left out without splitting the record: filters interpolate across them."""
 FEWEST = 50
-"""Rows of a piece that is worth looking at."""
+"""Fewest rows of a usable piece."""
 JUMP, ALONE, COUNTS = 20.0, 3.0, 10.0
-"""What a position jumps by, at least: times what rows usually change by, times the rows beside it, since an axis takes
-several rows to gather speed, and steps of its encoder."""
+"""Smallest jump of a position: multiples of the usual change per row, of the neighbouring rows (an axis needs several
+rows to accelerate), and of the encoder's step."""
 RANGE = 0.8
-"""Of all the way that a position goes, from which on one row is no motion: its counter starts anew."""
+"""Share of the whole travel beyond which a change in one row is not motion: the counter restarts."""
 TURNS, NEARLY = (2.0 * math.pi, 360.0), 0.05
-"""One turn, in rad and degrees, and how near a jump comes to it."""
+"""One turn, in rad and degrees, and the tolerance of a jump by it."""
 SNAP = 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Which rows are looked at: all that lie in the times, in the rows, and in none of what is left out.
+    """Selection of rows: within the times and rows, and not left out.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Cut:
 
     @property
     def words(self) -> str:
-        """References to the options that select the rows."""
+        """Return references to the options that select the rows."""
         said = {
             "start": self.start != -math.inf, "end": self.end != math.inf,
             "rows": self.rows != (1, math.inf), "leave_out": bool(self.leave_out),
@@ -77,7 +77,7 @@ def parse_rows(option: str, text: str) -> tuple[float, float]:
     Raises
     ------
     InputError
-        If the text is none of these, or the rows run backwards.
+        If the text has another form, or the rows are in reverse order.
     """
     first, colon, last = text.partition(":")
     try:
@@ -94,12 +94,12 @@ def parse_rows(option: str, text: str) -> tuple[float, float]:
 
 
 def cut(record: Record, asked: Cut) -> Record:
-    """The rows asked for, in one record.
+    """Return the requested rows as one record.
 
     Raises
     ------
     InputError
-        If none or fewer than 20 rows are left, or rows are named that the record does not have.
+        If fewer than 20 rows remain, or the record does not have the requested rows.
     """
     if asked == Cut():
         return record
@@ -130,7 +130,7 @@ def cut(record: Record, asked: Cut) -> Record:
 
 
 def pieces(record: Record) -> tuple[list[Record], list[Finding]]:
-    """The record cut in two wherever another run starts or more than `BRIDGED` rows were left out; and what became of
+    """Split the record where another run starts or more than `BRIDGED` rows were left out; also return findings about
     short pieces.
 
     Raises
@@ -161,7 +161,7 @@ def pieces(record: Record) -> tuple[list[Record], list[Finding]]:
 
 
 def file_rows(record: Record) -> Any:
-    """The number in the file of every row, from 1."""
+    """Return the number of every row in its file, from 1."""
     kept: list[list[int]] = record.meta.get("reading", {}).get("kept_rows", [])
     if not kept:
         return np.arange(1, len(record) + 1)
@@ -170,20 +170,20 @@ def file_rows(record: Record) -> Any:
 
 
 def range_words(rows: Any, most: int = 20) -> str:
-    """Row numbers as A:B, comma between; beyond `most` runs their number."""
+    """Return row numbers as A:B, separated by commas; more than `most` runs are counted."""
     runs = _runs(rows)
     shown = [f"{a}" if a == b else f"{a}:{b}" for a, b in runs[:most]]
     return ", ".join(shown) + (f" and {len(runs) - most} more runs" if len(runs) > most else "")
 
 
 def _runs(rows: Any) -> list[list[int]]:
-    """Runs of consecutive numbers, first and last."""
+    """Return runs of consecutive numbers: first and last."""
     runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
     return [[int(r[0]), int(r[-1])] for r in runs if r.size]
 
 
 def taken(record: Record, keep: Any) -> Record:
-    """The rows of a mask, their numbers in the file kept."""
+    """Return the rows of a mask with their numbers in the file."""
     rows = file_rows(record)[keep]
     meta = dict(record.meta)
     meta["reading"] = {**meta.get("reading", {}), "kept_rows": _runs(rows)}
@@ -195,14 +195,14 @@ def taken(record: Record, keep: Any) -> Record:
 
 
 def unwrapped(record: Record) -> Record:
-    """The record with its position counted on where it jumps by a turn or by the range of its counter.
+    """Return the record with its position unwrapped where it jumps by a turn or by the range of its counter.
 
-    The reference is counted on alike. ``record.meta["derived"]`` says by how much.
+    The reference is unwrapped in the same way. ``record.meta["derived"]`` states the period.
 
     Raises
     ------
     InputError
-        Without a position, or where it nowhere jumps.
+        Without a position, or if it does not jump.
     """
     if "position" not in record.channels:
         raise InputError(
@@ -226,7 +226,8 @@ def unwrapped(record: Record) -> Record:
 
 
 def jumps(position: Array) -> tuple[Any, Array]:
-    """Where a position jumps, as no axis moves: rows before the jumps, and by how much beyond what it moved meanwhile.
+    """Return the jumps of a position that are not motion: the rows before them, and their size in addition to the
+    motion.
 
     Parameters
     ----------
@@ -234,7 +235,7 @@ def jumps(position: Array) -> tuple[Any, Array]:
         Without missing values and without spikes.
     """
     steps = np.diff(position)
-    if np.count_nonzero(steps) < 20:  # it hardly moves: a count of its encoder is all its way
+    if np.count_nonzero(steps) < 20:  # it hardly moves: its travel is one encoder count
         return np.empty(0, dtype=int), np.empty(0)
     padded = np.pad(steps, 2, mode="edge")
     beside = np.stack([padded[k : k + steps.size] for k in (0, 1, 3, 4)])
@@ -243,14 +244,14 @@ def jumps(position: Array) -> tuple[Any, Array]:
     alone = np.abs(steps) > ALONE * np.max(np.abs(beside), axis=0)
     far = size > max(JUMP * float(np.percentile(size, 95)), least, 1e-12)
     anew = np.abs(steps) > max(RANGE * float(np.ptp(position)), least, 1e-12)
-    # Fast motion hides the usual step of one that starts anew with every turn, not the turn.
+    # Fast motion hides the usual step of a position that restarts every turn, but not the turn.
     turned = np.any([np.abs(size / turn - 1.0) < NEARLY for turn in TURNS], axis=0) & (size > least)
     at = np.flatnonzero((alone & (far | turned)) | anew)
     return at, size[at]
 
 
 def _period(record: Record) -> float:
-    """After which the position starts anew, in its unit; 0 where it does not."""
+    """Return the period after which the position restarts, in its unit; 0 if it does not."""
     _, sizes = jumps(record["position"][np.isfinite(record["position"])])
     if not sizes.size:
         return 0.0
@@ -259,7 +260,7 @@ def _period(record: Record) -> float:
 
 
 def _known_periods(record: Record) -> list[float]:
-    """Turns of either side of the gear, and counters of so many bits."""
+    """Return the known periods: a turn on either side of the gear, and counters of common sizes."""
     reading: dict[str, Any] = record.meta.get("reading", {})
     drive: dict[str, Any] = reading.get("drive", {})
     column: dict[str, Any] = next(

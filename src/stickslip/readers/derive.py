@@ -1,4 +1,4 @@
-"""Signals computed from others, on request and named in the record's ``meta["derived"]``."""
+"""Compute signals from others, on request; they are listed in the record's ``meta["derived"]``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def with_velocity(record: Record, method: str = "butterworth", *, cutoff: float | None = None) -> Record:
-    """The record with the velocity as derivative of its position, without phase.
+    """Return the record with the velocity as zero-phase derivative of its position.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def with_velocity(record: Record, method: str = "butterworth", *, cutoff: float 
         Central differences of the position, filtered forward and backward; or the slope of a polynomial fitted to a
         sliding window (Savitzky and Golay 1964).
     cutoff : float
-        Hz; -3 dB of the two passes together. A tenth of the sampling frequency where it is not given.
+        Hz; -3 dB of both passes together. Default: a tenth of the sampling frequency.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def with_velocity(record: Record, method: str = "butterworth", *, cutoff: float 
     signal: Any = importlib.import_module("scipy.signal")
     if method == "butterworth":
         order = 4
-        # Two passes damp twice: each is 1.5 dB down at the cutoff asked for.
+        # Two passes damp twice: each has -1.5 dB at the requested cutoff.
         single = cutoff / (np.sqrt(2.0) - 1.0) ** (0.5 / order)
         sections = signal.butter(order, min(single, 0.499 * rate), fs=rate, output="sos")
         smooth = signal.sosfiltfilt(
@@ -77,13 +77,13 @@ def with_velocity(record: Record, method: str = "butterworth", *, cutoff: float 
 
 
 def with_position(record: Record) -> Record:
-    """The record with the position as integral of its velocity, from 0, by trapezoids.
+    """Return the record with the position as integral of its velocity, from 0, by trapezoids.
 
     Returns
     -------
     Record
-        Channel ``position`` in rad (or m) replaced or added; what friction does within a count of an encoder, and where
-        on a turn the axis stands, no integral shows.
+        Channel ``position`` in rad (or m) replaced or added. An integral shows neither friction within an encoder count
+        nor the angle within a turn.
 
     Raises
     ------
@@ -105,26 +105,26 @@ def with_position(record: Record) -> Record:
 
 
 def positioned(record: Record) -> Record:
-    """The record of an axis, its position the integral of the velocity where it has none; of a
-    tribometer's friction torque none is needed."""
+    """Return the record of an axis; without a position it is the integral of the velocity. A tribometer's friction
+    torque needs none."""
     lacks = "velocity" in record.channels and not {"position", "friction_torque"} & record.channels.keys()
     return with_position(record) if lacks else record
 
 
 def with_resampled_time(record: Record, period: float | None = None) -> Record:
-    """The record interpolated linearly on an even grid.
+    """Return the record, linearly interpolated on an even grid.
 
     Parameters
     ----------
     record : Record
-        Times ascend.
+        With increasing times.
     period : float
-        s; the median sample interval where it is not given.
+        s; default: the median sample interval.
 
     Raises
     ------
     InputError
-        If times do not ascend, or the period is not positive.
+        If times are not increasing, or the period is not positive.
     """
     steps = np.diff(record.time)
     if len(record) < 2 or not np.all(steps > 0.0):
@@ -143,7 +143,7 @@ def with_resampled_time(record: Record, period: float | None = None) -> Record:
 
 
 def _window(signal: Any, order: int, frequency: float, limit: int) -> int:
-    """The shortest window whose slope is 3 dB too small at a frequency, rad a sample."""
+    """Return the shortest window whose slope has -3 dB at a frequency, rad per sample."""
     points = (order + 2) | 1
     while points <= limit:
         weights = np.asarray(signal.savgol_coeffs(points, order, deriv=1, use="dot"))
@@ -155,7 +155,7 @@ def _window(signal: Any, order: int, frequency: float, limit: int) -> int:
 
 
 def _rate(record: Record) -> float:
-    """The sampling frequency, Hz, of a record that can be filtered."""
+    """Return the sampling frequency, Hz, of a record that can be filtered."""
     steps = np.diff(record.time)
     if "position" not in record.channels:
         raise InputError("the record has no position to derive a velocity from")

@@ -1,7 +1,7 @@
-"""HDF5: every numeric dataset; units from its attribute `unit` or `units`.
+"""Read HDF5: every numeric dataset; units from its attribute `unit` or `units`.
 
-The file is read in a process of its own: on damaged files the HDF5 library (seen with 2.0) can crash, or step for ever
-through a heap of texts, and no check before it short of a second HDF5 library rules that out.
+The file is read in a separate process: on damaged files the HDF5 library (2.0) can crash or loop forever, and only a
+second HDF5 library could check for this in advance.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ UNIT_KEYS = ("unit", "units", "Unit", "Units")
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """The signature of HDF5, not in a MAT file's clothes."""
+    """Accept the signature of HDF5, but not MAT files."""
     return head.startswith(b"\x89HDF\r\n\x1a\n")
 
 
 def read(path: Path) -> Table:
-    """Every numeric dataset, named by its path."""
+    """Read every numeric dataset, named by its path."""
     return read_tree(path, "hdf5", matlab=False)
 
 
 def read_tree(path: Path, format_name: str, matlab: bool) -> Table:
-    """Read the groups of an HDF5 file; `matlab` says that strings are stored as numbers."""
+    """Read the groups of an HDF5 file; with `matlab` strings are stored as numbers."""
     return _guard.read_apart(_read_here, path, format_name, matlab, library="the HDF5 library")
 
 
@@ -47,7 +47,7 @@ def _read_here(path: Path, format_name: str, matlab: bool) -> Table:
             tree = reading.group(file, "")
     except (InputError, MemoryError):
         raise
-    except Exception as error:  # h5py passes on whatever the C library says
+    except Exception as error:  # h5py passes on any error of the C library
         raise InputError(
             f"{path} cannot be read as HDF5 ({type(error).__name__}: {error}); check that it is complete"
         ) from None
@@ -57,19 +57,19 @@ def _read_here(path: Path, format_name: str, matlab: bool) -> Table:
 
 
 class _Reading:
-    """Goes through the groups of a file; what is in other files is not followed."""
+    """Reads the groups of a file; links to other files are not followed."""
 
     def __init__(self, h5py: Any, path: Path, matlab: bool) -> None:
         self.h5py, self.path, self.matlab = h5py, path, matlab
         self.units: dict[str, str] = {}
         self.findings: list[Finding] = []
         self._within: set[int] = set()
-        """Addresses of the groups around the one that is read."""
+        """Addresses of the parent groups of the current one."""
         self._items = 0
         self._values = 0
 
     def group(self, group: Any, path: str) -> dict[str, Any]:
-        """The datasets, groups and attributes of a group, by name."""
+        """Return datasets, groups and attributes of a group, by name."""
         h5py = self.h5py
         out: dict[str, Any] = {}
         self._items += len(group)
@@ -84,10 +84,10 @@ class _Reading:
             if isinstance(link, h5py.ExternalLink):
                 self._elsewhere(name, str(link.filename))
                 continue
-            # A broken link is no reason to give up the rest.
+            # A broken link does not prevent reading the rest.
             item = group.get(key, None)
             if isinstance(item, h5py.Group):
-                # A link to a group around it leads to nothing new.
+                # A link to a parent group adds nothing.
                 if name.count(".") <= 12 and h5py.h5o.get_info(item.id).addr not in self._within:
                     out[str(key)] = self.group(item, name)
             elif isinstance(item, h5py.Dataset):
@@ -126,7 +126,7 @@ class _Reading:
         return None
 
     def _elsewhere(self, name: str, file: str) -> None:
-        """Report what the file has in another one."""
+        """Report data that are stored in another file."""
         message = f"{name!r} is stored in another file, {file!r}, which is not opened; it was left out"
         remedy = "copy the data into one file (h5repack, or h5py's Group.copy with expand_external)"
         self.findings.append(Finding("warning", "not-read", message, remedy=remedy))

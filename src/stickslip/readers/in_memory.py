@@ -1,4 +1,4 @@
-"""Signals that are in memory already: arrays by name, a mapping of arrays, a data frame, a structured array."""
+"""Read signals from memory: arrays by name, a mapping of arrays, a data frame, a structured array."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ FORMAT = "arrays"
 def table_of_signals(
     signals: Mapping[str, Any], units: Mapping[str, str], arguments: Mapping[str, str]
 ) -> tuple[Table, dict[str, str]]:
-    """A column for every signal, and the mapping that says which channel it is.
+    """Return a column for every signal, and the mapping of channels to columns.
 
     Parameters
     ----------
     signals : mapping of str to array_like, shape (n,)
         By channel, or its short name (torque, reference, ...).
     units : mapping of str to str
-        By the same names; SI where one has none, of a linear axis (m, N) where another is.
+        By the same names; default SI, for a linear axis (m, N) if another signal is linear.
     arguments : mapping of str to str
-        What messages call a signal, where that is not its name.
+        Name of a signal in messages, if it differs.
 
     Raises
     ------
     InputError
-        If a signal is no vector of numbers, lengths differ, or a unit is given for what is no signal.
+        If a signal is not a vector of numbers, lengths differ, or a unit is given for an unknown signal.
     """
     columns: list[Column] = []
     for name, values in signals.items():
@@ -69,18 +69,18 @@ def table_of_signals(
         role = ALIASES.get(name, name)
         kind = KINDS[role][0]
         channels[role] = f"{name}:{units.get(name) or SI[LINEAR.get(kind, kind) if linear else kind]}"
-    # A channel that is not given must not be guessed from another's name.
+    # A missing channel must not be guessed from the name of another.
     left_out = {role: "none" for role in KINDS if role not in channels}
     return Table(FORMAT, tuple(columns)), channels | left_out
 
 
 def numbers_of(name: str, values: Any, dates: bool = False) -> Array:
-    """A signal's numbers; if `dates` are allowed, those of dates and of differences of time in s from the first.
+    """Return a signal's numbers; if `dates` are allowed, dates and time differences in s from the first.
 
     Raises
     ------
     InputError
-        If they are none.
+        If they are not numbers.
     """
     try:
         given = with_dates(values)
@@ -99,12 +99,12 @@ def numbers_of(name: str, values: Any, dates: bool = False) -> Array:
 
 
 def with_dates(values: Any) -> np.ndarray[Any, Any]:
-    """An array; dates of Python, of pandas and of a time zone as NumPy's (UTC).
+    """Return an array; dates of Python, of pandas and with a time zone become those of NumPy (UTC).
 
     Raises
     ------
     TypeError, ValueError
-        If something is masked of what is no number and no date.
+        If masked values are neither numbers nor dates.
     """
     if getattr(getattr(values, "dtype", None), "tz", None) is not None:
         values = array_of(values)
@@ -115,7 +115,7 @@ def with_dates(values: Any) -> np.ndarray[Any, Any]:
 
 
 def _are_dates(values: Any) -> bool:
-    """Whether the first value that is there is a date."""
+    """Whether the first value that is not missing is a date."""
     try:
         given = np.asarray(values)
     except ValueError:  # lists of different lengths, or one that contains itself
@@ -127,7 +127,7 @@ def _are_dates(values: Any) -> bool:
 
 
 def _date(value: Any) -> Any:
-    """A date as NumPy has it; NaT where there is none."""
+    """Return a date of NumPy; NaT if missing."""
     if value is None:
         return np.datetime64("NaT")
     if getattr(value, "tzinfo", None) is not None:
@@ -136,12 +136,12 @@ def _date(value: Any) -> Any:
 
 
 def _seconds(dates: np.ndarray[Any, Any], first: Any) -> Array:
-    """Dates or differences of time in s from the first of them; NaN where there is none.
+    """Return dates or time differences in s from the first; NaN if missing.
 
     Raises
     ------
     TypeError
-        Of a count of steps without a unit of time.
+        For a number of steps without a unit of time.
     """
     if np.datetime_data(dates.dtype)[0] == "generic":
         raise TypeError("a time without a unit")
@@ -150,12 +150,13 @@ def _seconds(dates: np.ndarray[Any, Any], first: Any) -> Array:
 
 
 def table_in_memory(data: Any) -> Table:
-    """The columns of a mapping of arrays, a data frame or a structured array; their names say what they are.
+    """Return the columns of a mapping of arrays, a data frame or a structured array; their names determine the
+    channels.
 
     Raises
     ------
     InputError
-        If it holds no columns of numbers.
+        If it has no columns of numbers.
     """
     if getattr(data, "ndim", None) == 0:
         data = data.item()  # an array around one object
@@ -184,7 +185,7 @@ def table_in_memory(data: Any) -> Table:
 
 
 def refuse_the_same_name(names: Sequence[str]) -> None:
-    """Refuse two columns of one name: which of them is meant, nobody can say.
+    """Refuse two columns of the same name.
 
     Raises
     ------
@@ -198,21 +199,21 @@ def refuse_the_same_name(names: Sequence[str]) -> None:
 
 
 def name_of(index: Any) -> str:
-    """What the index of a data frame is called: dates need no name to be times; a plain row number says nothing."""
+    """Return the name of a data frame's index: dates are times even without a name; a plain row number is ignored."""
     if index.name is not None:
         return str(index.name)
     return "time" if index.dtype.kind in "mM" else ""
 
 
 def array_of(column: Any) -> Any:
-    """A column as NumPy's array; dates of a time zone, too, as dates."""
+    """Return a column as a NumPy array; dates with a time zone remain dates."""
     if getattr(column.dtype, "tz", None) is not None:
         column = getattr(column, "dt", column).tz_convert(None)
     return column.to_numpy()
 
 
 def _plain(values: Any) -> Any:
-    """Arrays of whatever library as NumPy's, dates in s since 1970; anything else as it is."""
+    """Return arrays of any library as NumPy arrays, dates in s since 1970; anything else unchanged."""
     if not hasattr(values, "__array__"):
         first: Any = next(iter(cast("list[Any]", values)), None) if isinstance(values, list) else None
         dated = isinstance(first, (datetime, np.datetime64))
@@ -222,7 +223,7 @@ def _plain(values: Any) -> Any:
 
 
 def digest_of(table: Table) -> str:
-    """SHA-256 of all columns, so that a result names what it comes from."""
+    """Return the SHA-256 of all columns, which identifies the source of a result."""
     digest = hashlib.sha256()
     for column in table.columns:
         digest.update(column.name.encode() + b"\0" + np.ascontiguousarray(column.values).tobytes())

@@ -1,4 +1,4 @@
-"""JSON: a list of samples, alone or beside metadata; columns of numbers; or one sample a line."""
+"""Read JSON: a list of samples, with or without metadata; columns of numbers; or one sample per line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stickslip.readers.table_columns import Format, Table
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """A bracket or brace comes first, and the name does not say otherwise."""
+    """Accept a file that starts with a bracket or brace, unless its suffix is that of another format."""
     text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
     return text[:1] == b"{" or (
         text[:1] == b"[" and path.suffix.lower() in (".json", ".jsonl", ".ndjson", "")
@@ -22,7 +22,7 @@ def recognise(head: bytes, path: Path) -> bool:
 
 
 def read(path: Path) -> Table:
-    """The samples as columns; single values as constants."""
+    """Return the samples as columns, single values as constants."""
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -53,7 +53,7 @@ def _parse(path: Path, text: str) -> Any:
 
 
 def _split(parts: Mapping[str, Any]) -> Any:
-    """The layout of pandas: names of columns, and rows of values."""
+    """Read the layout of pandas: names of columns, and rows of values."""
     names = [str(name) for name in cast("list[Any]", parts["columns"])]
     rows = cast("list[Any]", parts["data"])
     if not all(isinstance(row, list) and len(cast("list[Any]", row)) == len(names) for row in rows):

@@ -1,7 +1,7 @@
-"""Limits on one file: its columns, its lines, and the values that it unpacks to.
+"""Limits for one file: columns, length of lines, and number of values after unpacking.
 
 A small compressed file may unpack to more than the machine's memory. Readers therefore compare the sizes that a file
-declares with these bounds before they unpack it, on the command line, in Python and on the page alike.
+declares with these bounds before they unpack it.
 """
 
 from __future__ import annotations
@@ -12,23 +12,23 @@ from stickslip.capacity import free_memory, size_text
 from stickslip.errors import InputError
 
 MAX_COLUMNS = 5_000
-"""Columns of a file: a car's measurement file has a few thousand channels."""
+"""Most columns of a file: a car's measurement file has a few thousand channels."""
 LONGEST_LINE = 32 * MAX_COLUMNS
-"""Characters of a line of text: `MAX_COLUMNS` numbers with all their digits and delimiters."""
+"""Most characters of a line: `MAX_COLUMNS` numbers with all digits and delimiters."""
 COPIES = 3
-"""Copies of a value that exist at the same time while a file is read: as stored, as a column, as a channel."""
+"""Copies of a value in memory while a file is read: as stored, as a column, as a channel."""
 
 
 def memory_for(size: int) -> int:
-    """Bytes that reading a file of `size` bytes may take.
+    """Return the memory, in bytes, that reading a file of `size` bytes may use.
 
-    A text of numbers takes about four times its size while it is read and examined; a short one next to nothing.
+    A text of numbers takes about four times its size while it is read and examined.
     """
     return 900 * 2**20 + 12 * size
 
 
 def too_large(path: Path) -> InputError:
-    """Return the error for a file that takes more memory than `memory_for` while it is read, whatever it declares."""
+    """Return the error for a file that uses more memory than `memory_for` while it is read."""
     size = size_of(path)
     return InputError(
         f"{path} has {size_text(size)} and needs more than {size_text(memory_for(size))} of memory to read; save it "
@@ -37,14 +37,14 @@ def too_large(path: Path) -> InputError:
 
 
 def size_of(path: Path) -> int:
-    """Bytes of a file, or of all files in a folder."""
+    """Return the size of a file, or of all files in a folder, in bytes."""
     if path.is_dir():
         return sum(p.stat().st_size for p in path.rglob("*") if p.is_file())
     return path.stat().st_size
 
 
 def insist_on_values(path: Path, count: float) -> None:
-    """Refuse a file with more values than reading a file of its size may take.
+    """Refuse a file with too many values for its size.
 
     Parameters
     ----------

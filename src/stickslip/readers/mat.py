@@ -1,4 +1,4 @@
-"""MATLAB files: version 5 to 7.2 by SciPy, version 7.3 (which is HDF5) by h5py."""
+"""Read MATLAB files: versions 5 to 7.2 by SciPy, version 7.3 (which is HDF5) by h5py."""
 
 from __future__ import annotations
 
@@ -19,21 +19,19 @@ from stickslip.readers.table_columns import Format, Table
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """Both versions begin with a line of text; version 4 has only its file name."""
+    """Accept the text at the start of both versions; version 4 is recognised by its suffix."""
     return head.startswith(b"MATLAB") or (path.suffix.lower() == ".mat" and not head.startswith(b"\x89HDF"))
 
 
 def read(path: Path) -> Table:
-    """Every numeric variable and field of a structure, joined by dots."""
+    """Read every numeric variable and field of a structure, with names joined by dots."""
     with path.open("rb") as file:
         head = file.read(1024)
     if head.startswith(b"MATLAB 7.3") or b"\x89HDF" in head:
         return hdf5.read_tree(path, "mat", matlab=True)
     loadmat: Any = importlib.import_module("scipy.io").loadmat
     try:
-        if (
-            0 not in head[:4]
-        ):  # version 4 has no text at its beginning, and SciPy reads it without compiled code
+        if 0 not in head[:4]:  # version 4 has no header text, and SciPy reads it without compiled code
             variables = _mat_check.check(path.read_bytes(), lambda count: insist_on_values(path, count))
             insist_on_columns(path, variables)
         with warnings.catch_warnings():
@@ -41,7 +39,7 @@ def read(path: Path) -> Table:
             loaded = cast("Mapping[str, Any]", loadmat(path, simplify_cells=True))
     except InputError:
         raise
-    except Exception as error:  # SciPy raises a dozen kinds on a damaged file
+    except Exception as error:  # SciPy raises a dozen types of errors for damaged files
         raise InputError(f"{path} is no MAT file that can be read ({type(error).__name__}: {error}); "
                          "save it again with `save file.mat -v7`") from None  # fmt: skip
     tree = {k: v for k, v in loaded.items() if not k.startswith("__") and not _opaque(v)}

@@ -1,7 +1,7 @@
-"""MDF 3 and 4, measurement and calibration tools' format, by asammdf (LGPL-3.0+, an extra: `stickslip[mdf]`).
+"""Read MDF 3 and 4, a format of measurement and calibration tools, by asammdf (LGPL-3.0+, extra `stickslip[mdf]`).
 
-Read in a process of its own: asammdf is partly compiled, and what it leaves of a damaged file complains later, when
-Python tidies up, in the midst of something else.
+The file is read in a separate process: asammdf is partly compiled, and its half-made objects of a damaged file raise
+errors later, when Python deletes them.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from stickslip.readers.table_columns import Column, Format, Table
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """The identification block."""
+    """Accept the identification block."""
     return head.startswith((b"MDF     ", b"UnFinMF "))
 
 
 def read(path: Path) -> Table:
-    """Every channel of numbers with its unit and the clock of its group."""
+    """Read every numeric channel with its unit and the times of its group."""
     needed("asammdf", "mdf", "MDF files need")
     return _guard.read_apart(_read_here, path, library="asammdf")
 
@@ -47,7 +47,7 @@ def _read_here(path: Path) -> Table:
                     )
     except (InputError, MemoryError):
         raise
-    except Exception as error:  # asammdf raises several kinds on a damaged file
+    except Exception as error:  # asammdf raises several types of errors for damaged files
         raise InputError(
             f"{path} cannot be read as MDF ({type(error).__name__}: {error}); export it again"
         ) from None

@@ -1,4 +1,4 @@
-"""NumPy's npy and npz files; nothing pickled is ever loaded."""
+"""Read NumPy's npy and npz files; pickles are never loaded."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ NPY = b"\x93NUMPY"
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """The signature of npy, or a zip archive that holds such files."""
+    """Accept the signature of npy, or a zip archive of such files."""
     return head.startswith(NPY) or (
         head.startswith(b"PK") and (b".npy" in head or path.suffix.lower() == ".npz")
     )
 
 
 def read(path: Path) -> Table:
-    """The arrays of the file: structured ones by field, matrices by column."""
+    """Read the arrays of the file: structured ones by field, matrices by column."""
     try:
         insist_on_arrays(path)
         loaded: Any = np.load(path, allow_pickle=False)
         tree = {k: loaded[k] for k in loaded.files} if hasattr(loaded, "files") else loaded
     except InputError:
         raise
-    except Exception as error:  # NumPy, zip, zlib and the tokenizer of headers each raise their own
+    except Exception as error:  # NumPy, zip, zlib and the parser of headers each raise their own errors
         raise InputError(
             f"{path} cannot be read as NumPy arrays ({error}); save plain arrays of numbers, without objects"
         ) from None
@@ -40,7 +40,7 @@ def read(path: Path) -> Table:
 
 
 def insist_on_arrays(path: Path) -> None:
-    """Refuse more arrays or values than may be read, by the headers of the arrays alone.
+    """Refuse too many arrays or values, by the headers of the arrays alone.
 
     Raises
     ------
@@ -62,7 +62,8 @@ def insist_on_arrays(path: Path) -> None:
 
 
 def _values(file: IO[bytes]) -> int:
-    """Return the number of values of the array that starts here; 0 if none does. A text of n letters counts as n."""
+    """Return the number of values of the array that starts here, 0 if none does. A string of n characters counts as
+    n."""
     if file.read(len(NPY)) != NPY:
         return 0
     major, _ = file.read(2)

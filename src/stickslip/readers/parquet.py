@@ -1,7 +1,7 @@
-"""Parquet files; units from the field's metadata (`unit` or `units`).
+"""Read Parquet files (extra `stickslip[parquet]`); units from the field's metadata (`unit` or `units`).
 
-A column of lists of one length, such as the joints of a robot, becomes a column for each place: ``state[0]``. Columns
-of other types are not loaded.
+A column of lists of equal length, such as the joints of a robot, becomes a column for each element: ``state[0]``.
+Columns of other types are not loaded.
 """
 
 from __future__ import annotations
@@ -13,26 +13,28 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
+from stickslip.extras import needed
 from stickslip.finding import Finding
 from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Array, Column, Format, Table
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """Its signature."""
+    """Accept its signature."""
     return head.startswith(b"PAR1")
 
 
 def read(path: Path) -> Table:
-    """Every column of numbers, truth values, times or lists of numbers; nulls become NaN."""
+    """Read every column of numbers, truth values, times or lists of numbers; nulls become NaN."""
+    parquet, pa = (
+        needed(module, "parquet", "Parquet files need") for module in ("pyarrow.parquet", "pyarrow")
+    )
     try:
-        parquet: Any = importlib.import_module("pyarrow.parquet")
-        pa: Any = importlib.import_module("pyarrow")
         with parquet.ParquetFile(path) as file:
             return _read(pa, file, path)
     except InputError:
         raise
-    except Exception as error:  # Arrow raises its own, OSError, ValueError, ...
+    except Exception as error:  # Arrow raises its own errors, OSError, ValueError, ...
         raise InputError(
             f"{path} cannot be read as Parquet ({type(error).__name__}: {error}); check that it is complete"
         ) from None
@@ -63,7 +65,7 @@ def _read(pa: Any, file: Any, path: Path) -> Table:
 
 
 def _insist_on_size(path: Path, metadata: Any, names: set[str]) -> None:
-    """Refuse more values than may be read, by the counts that the file declares: runs of one value take no space."""
+    """Refuse too many values, by the counts that the file declares, because repeated values take no space."""
     count = 0
     for i in range(metadata.num_row_groups):
         group = metadata.row_group(i)
@@ -80,7 +82,7 @@ def _root(path: str, names: set[str]) -> bool:
 
 
 def _element(pa: Any, kind: Any) -> Any:
-    """The type of the values of a list; the type itself of anything else."""
+    """Return the type of the values of a list, else the type itself."""
     types = pa.types
     if types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind):
         return kind.value_type
@@ -96,7 +98,7 @@ def _is_known(pa: Any, kind: Any) -> bool:
 
 
 def _parts(pa: Any, column: Any, kind: Any) -> list[tuple[str, Array]]:
-    """A column's numbers; of lists of one length those of each place. Nothing if the lengths differ."""
+    """Return a column's numbers, for lists of equal length those of each element; nothing if the lengths differ."""
     element = _element(pa, kind)
     if element is kind:
         return [("", _numbers(pa, column, kind))]
@@ -112,7 +114,7 @@ def _parts(pa: Any, column: Any, kind: Any) -> list[tuple[str, Array]]:
 
 
 def _numbers(pa: Any, column: Any, kind: Any) -> Array:
-    """A column as floats; times in s."""
+    """Return a column as floats, times in s."""
     types = pa.types
     if types.is_timestamp(kind) or types.is_duration(kind) or types.is_time(kind):
         scale = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[kind.unit]

@@ -1,4 +1,4 @@
-"""Profiles: what the user once said about a layout of columns, kept for the next file of that layout.
+"""Profiles: the user's choices for a layout of columns, saved for the next file with that layout.
 
 A profile is a TOML file, named by the user or kept under the layout's fingerprint in the user's configuration folder
 (`STICKSLIP_CONFIG`, else `XDG_CONFIG_HOME`/stickslip, `APPDATA`/stickslip or ~/.config/stickslip).
@@ -27,16 +27,16 @@ from stickslip.record import Record
 from stickslip.whole_files import write_whole
 
 PUTS_OUT = {"force_constant": TURNING, **dict.fromkeys(TURNING, ("force_constant",))}
-"""What is said now of a linear motor takes the place of what a profile says of one that turns, and the other way."""
+"""Numbers of a linear motor replace those of a rotary one in a profile, and vice versa."""
 SIZES = ("speed", "torque")
-"""What `sizes` tells of a record."""
+"""Quantities of `sizes`."""
 STATEMENTS = 20
-"""Files whose numbers a profile keeps, the last ones."""
+"""Most files whose numbers a profile keeps, the latest ones."""
 
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """Numbers that were said for one file: they are its machine's, and other machines' files have the same columns.
+    """Numbers given for one file. They belong to its machine; files of other machines may have the same columns.
 
     Attributes
     ----------
@@ -44,9 +44,9 @@ class Statement:
     sample_time : float or None
         s
     file, sha256, date : str
-        Path and digest of the file, and the day (ISO 8601) of the last word; empty where nobody knows them.
+        Path and digest of the file, and the date (ISO 8601) of the last change; empty if unknown.
     seen : mapping of str to float
-        Size of speed and torque in it, as `sizes` gives it.
+        Size of speed and torque in the file, from `sizes`.
     """
 
     drive: Drive
@@ -57,25 +57,25 @@ class Statement:
     seen: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def numbers(self) -> dict[str, Any]:
-        """What it says, by name."""
+        """Its numbers, by name."""
         out = {n: x for n, x in self.drive.known().items() if (n, x) != ("side", "motor")}
         return out if self.sample_time is None else {**out, "sample_time": self.sample_time}
 
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """What is said about files of one layout.
+    """The choices for files of one layout.
 
     Attributes
     ----------
     mapping : mapping of str to str
         Channel to "COLUMN", "COLUMN:UNIT" or "COLUMN:UNIT@side".
     drive : Drive
-        Of a profile that the user names: it is one machine's.
+        Numbers of a profile that the user names, which belongs to one machine.
     sample_time : float or None
         s, for files without times.
     said : tuple of Statement
-        Of a profile that is found by the columns: what was said for which file, the last word at the end.
+        Numbers of a profile that is found by its columns, for each file, the latest at the end.
     """
 
     mapping: Mapping[str, str]
@@ -85,7 +85,7 @@ class Profile:
 
 
 def alike(first: Profile, second: Profile) -> bool:
-    """Whether both say the same; a number that nobody gave (not a number) is equal to another."""
+    """Whether both are equal; missing numbers (NaN) are equal to each other."""
     said = [
         (dict(p.mapping), p.drive.known(), p.sample_time, [(s.sha256, s.numbers()) for s in p.said])
         for p in (first, second)
@@ -94,7 +94,7 @@ def alike(first: Profile, second: Profile) -> bool:
 
 
 def sizes(record: Record) -> dict[str, float]:
-    """Size of speed and torque that 95 % of the rows keep, in the record's units."""
+    """Return the sizes of speed and torque that 95 % of the rows do not exceed, in the record's units."""
     out: dict[str, float] = {}
     if "position" in record.channels and len(record) > 100:
         step = max(1, len(record) // 1000)
@@ -107,13 +107,13 @@ def sizes(record: Record) -> dict[str, float]:
 
 
 def fingerprint(table: Table) -> str:
-    """Sixteen digits that the names and units of the columns determine, in whatever order they stand."""
+    """Return sixteen digits that identify names and units of the columns, in any order."""
     layout = sorted((c.name, c.unit) for c in table.columns)
     return hashlib.sha256(json.dumps(layout).encode()).hexdigest()[:16]
 
 
 def folder() -> Path:
-    """Where profiles are kept for this user."""
+    """Return the folder of this user's profiles."""
     if own := os.environ.get("STICKSLIP_CONFIG"):
         return Path(own) / "profiles"
     base = os.environ.get("APPDATA") if os.name == "nt" else os.environ.get("XDG_CONFIG_HOME")
@@ -121,7 +121,7 @@ def folder() -> Path:
 
 
 def remembered(table: Table) -> Path | None:
-    """The profile kept for this layout, if there is one."""
+    """Return the profile saved for this layout, or None."""
     path = folder() / f"{fingerprint(table)}.toml"
     return path if path.is_file() else None
 
@@ -146,7 +146,7 @@ def load(path: Path) -> Profile:
             with top.table("drive") as table, table.blamed():
                 drive = _drive_in(table)
         said = [_statement(own) for own in top.tables("said").values()]
-        if top.has("seen"):  # once there was one statement, of no file that is known
+        if top.has("seen"):  # an older form: one statement without a file
             said.insert(0, Statement(drive, sample_time, seen=_seen_in(top)))
         return Profile(mapping, drive, sample_time, tuple(said))
 
@@ -171,7 +171,7 @@ def _statement(own: Section) -> Statement:
 
 
 def merged(mapping: Sequence[str], drive: Drive, sample_time: float | None, kept: Profile | None) -> Profile:
-    """What is said now over what a profile says."""
+    """Return a profile with the current choices, which have priority."""
     before = kept or Profile({}, Drive())
     said = drive.known()
     out = {kept for name in said for kept in PUTS_OUT.get(name, ())}
@@ -183,7 +183,7 @@ def merged(mapping: Sequence[str], drive: Drive, sample_time: float | None, kept
 
 
 def save(profile: Profile, table: Table, path: Path | None = None) -> Path:
-    """Write a profile to a file, or where `remembered` finds it. Returns the path.
+    """Write a profile to a file, or to the place where `remembered` finds it; return the path.
 
     Raises
     ------
@@ -226,5 +226,5 @@ def _comment(text: str) -> str:
 
 
 def _quoted(value: str | float) -> str:
-    """A TOML value: JSON's escapes are TOML's, but for the character that JSON leaves alone."""
+    """Return a TOML string: JSON's escapes are those of TOML, except for one character that JSON does not escape."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

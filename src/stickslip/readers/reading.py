@@ -1,4 +1,4 @@
-"""From a file to a record: the format found, the columns chosen, the units converted."""
+"""Read a file as a record: detect the format, choose the columns, convert the units."""
 
 from __future__ import annotations
 
@@ -40,27 +40,27 @@ FORMATS = (
     "codesys_trace",
     "csv_text",
 )
-"""One file a format, asked in this order; text is last, since anything may be text."""
+"""Modules of the formats, tried in this order; text is last, because anything may be text."""
 TIMES_OF_A_TEXT = 4.0
-"""Memory that a text of numbers takes while it is read, in times its size."""
+"""Memory that a text of numbers uses while it is read, in multiples of its size."""
 CHANNELS = ROLES
-"""What the columns of a file may be."""
+"""Channels that the columns of a file may be."""
 PER_MILLE = re.compile(r"(?i)(?<![0-9a-f])60(?:77|b2)(?![0-9a-f])")
 """Objects of CiA 402 (IEC 61800-7-201) in thousandths of the rated torque: actual torque, torque offset."""
 
 PARTS = ("nanosec", "nanosecs", "nsec", "nsecs")
-"""Names of the nanoseconds in a time stamp of ROS."""
+"""Names of the nanoseconds in a ROS time stamp."""
 COUNT_RATE = re.compile(r"(?i)(?<![0-9a-f])60(?:6b|6c|ff)(?![0-9a-f])")
 """Its velocities, in counts per second where nothing else is set."""
 
 
 def formats() -> list[Format]:
-    """Every registered format."""
+    """Return all registered formats."""
     return [importlib.import_module(f"stickslip.readers.{name}").FORMAT for name in FORMATS]
 
 
 def open_table(path: str | os.PathLike[str]) -> Table:
-    """Read a file's columns as they stand.
+    """Read a file's columns without conversion.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def open_table(path: str | os.PathLike[str]) -> Table:
     except InputError as error:
         if "\n" not in str(error):
             raise
-        # Some libraries describe a damaged file in several lines.
+        # Some libraries describe a damaged file in several lines of text.
         raise InputError(" ".join(str(error).split())) from None
     except FileNotFoundError:
         raise InputError(f"no file {source}; check the path") from None
@@ -102,7 +102,7 @@ def open_table(path: str | os.PathLike[str]) -> Table:
 
 
 def _with_whole_stamps(table: Table) -> Table:
-    """Return the table with one column for every time stamp of ROS that has its seconds and nanoseconds in two."""
+    """Return the table with the seconds and nanoseconds of each ROS time stamp in one column."""
     columns = {c.name: c for c in table.columns}
     for name, seconds in list(columns.items()):
         match = re.fullmatch(r"(.+?)[._]s(?:ec)?(s?)", name)
@@ -139,21 +139,19 @@ def read(
 ) -> Record:
     """Read a file of any known format as a record in SI units.
 
-    Columns that the mapping does not name are guessed from their names and units. What was read from where, with
-    which factor, and what was odd about it, is in ``record.meta["reading"]``; what was computed, in
-    ``record.meta["derived"]``.
+    Columns that the mapping does not name are guessed from their names and units. Sources, factors and findings are in
+    ``record.meta["reading"]``, computed channels in ``record.meta["derived"]``.
 
     Parameters
     ----------
     path : path
     mapping : mapping of str to str, or sequence of str
-        ``{"position": "q_deg:deg"}`` or ``["position=q_deg:deg"]``: a channel, its column, its unit. A unit may have
-        a factor ("0.25 um"); "@load" behind it says that it was measured on the load's side of the gear; "none"
-        leaves the channel out.
+        ``{"position": "q_deg:deg"}`` or ``["position=q_deg:deg"]``: a channel, its column, its unit. A unit may have a
+        factor ("0.25 um"); "@load" after it marks a signal on the load side of the gear; "none" ignores the channel.
     drive : Drive
-        Counts a revolution, rated torque, torque constant, gear ratio.
+        Counts per revolution, rated torque, torque constant, gear ratio.
     profile : path
-        A profile that `stickslip.readers.profiles.save` wrote; the arguments above overrule it.
+        A profile that `stickslip.readers.profiles.save` wrote; the arguments above have priority.
     sample_time : float
         s, for files without times.
 
@@ -165,7 +163,7 @@ def read(
     Raises
     ------
     InputError
-        If the file cannot be read, columns are missing or ambiguous, or a unit needs a number that nobody gave.
+        If the file cannot be read, columns are missing or ambiguous, or a unit requires a number that is missing.
     """
     table = open_table(path)
     kept = profiles.load(Path(profile)) if profile is not None else None
@@ -185,7 +183,7 @@ def record_of(
     sample_time: float | None = None,
     steady: bool = False,
 ) -> Record:
-    """The record of a table; with `steady`, rows without times are steady points (see `convert`).
+    """Return the record of a table; with `steady`, rows without times are steady points (see `convert`).
 
     Errors among the findings about its columns are left to the caller.
 
@@ -202,7 +200,7 @@ def record_of(
     settings = profiles.merged([], drive or Drive(), sample_time, profile).drive
     remembered = sample_time is None and profile is not None and profile.sample_time is not None
     period = profile.sample_time if profile and remembered else sample_time
-    # Damaged files hold numbers that overflow: they are infinite then, and the doctor finds them.
+    # Numbers of damaged files may overflow; they become infinite, and the doctor finds them.
     with np.errstate(all="ignore"):
         record = convert(
             table, told(choices, table, settings), settings, period, [*table.findings, *findings],
@@ -218,7 +216,8 @@ def record_of(
 
 
 def told(choices: Sequence[Choice], table: Table, drive: Drive) -> list[Choice]:
-    """The choices, with the units of whole numbers that the drive's numbers tell: who gives counts a turn has them."""
+    """Return the choices with units of integers that follow from the drive's numbers: counts if counts per revolution
+    are given."""
     columns = {c.name: c for c in table.columns}
     known = drive.known()
     out: list[Choice] = []
@@ -237,7 +236,7 @@ def told(choices: Sequence[Choice], table: Table, drive: Drive) -> list[Choice]:
 
 
 def _whole(values: np.ndarray) -> bool:
-    """Whether all values are whole numbers, and not all alike."""
+    """Whether all values are integers, and not all equal."""
     finite = values[np.isfinite(values)]
     return bool(finite.size and np.ptp(finite) > 0.0 and np.all(finite == np.round(finite)))
 
@@ -245,9 +244,9 @@ def _whole(values: np.ndarray) -> bool:
 def joined(
     table: Table, path: str | os.PathLike[str], mapping: Sequence[str] = (), sample_time: float | None = None
 ) -> Table:
-    """A table with the columns of a second file of the same motion, which keep their own times.
+    """Return the table with the columns of a second file of the same motion, which keep their own times.
 
-    Both count from the same instant. Columns whose name the table has already get the file's name behind theirs.
+    Both have the same zero of time. The file's name is appended to columns whose names exist already.
 
     Parameters
     ----------
@@ -255,7 +254,7 @@ def joined(
     path : path
         Of the second file.
     mapping : sequence of str
-        As in `read`; what names other columns than the second file's is the table's.
+        As in `read`; entries for other columns belong to the table.
     sample_time : float
         s, for files without times.
 
@@ -269,7 +268,7 @@ def joined(
     mine = [m for m in mapping if m.partition("=")[2].partition("@")[0].rpartition(":")[0].lower() in own
             or m.partition("=")[2].lower() in own]  # fmt: skip
     try:
-        # Only its times are wanted; what its columns mean is found out among all.
+        # Only its times are needed here; its columns are assigned together with all others.
         choices, _ = choose(other, parse_mapping(mine))
         named = next((c.column for c in choices if c.role == "time"), "")
         clock, origin = times_of(other, choices, sample_time)
@@ -289,7 +288,7 @@ def joined(
 
 
 def with_source(record: Record, path: Path) -> Record:
-    """The record with its file's name and SHA-256 in meta."""
+    """Return the record with its file's name and SHA-256 in meta."""
     meta = dict(record.meta)
     digest = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
     meta["reading"] = {**meta["reading"], "file": str(path), "sha256": digest}

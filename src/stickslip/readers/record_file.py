@@ -1,4 +1,4 @@
-"""The package's own records: channels with their units, and meta."""
+"""Read the package's own records: channels with their units, and meta."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stickslip.record import Record
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """A zip archive with the header that `Record.save` writes, or a rig's stream."""
+    """Accept a zip archive with the header of `Record.save`, or a rig's stream."""
     if head.startswith(MAGIC):
         return True
     if not head.startswith(b"PK"):
@@ -27,7 +27,7 @@ def recognise(head: bytes, path: Path) -> bool:
 
 
 def read(path: Path) -> Table:
-    """Time and channels with their units."""
+    """Read time and channels with their units."""
     with path.open("rb") as file:
         packed = file.read(len(MAGIC)) != MAGIC
     if packed:
@@ -35,7 +35,7 @@ def read(path: Path) -> Table:
             insist_on_arrays(path)
         except InputError:
             raise
-        except Exception as error:  # zip, zlib and NumPy each raise their own on a damaged file
+        except Exception as error:  # zip, zlib and NumPy each raise their own errors for damaged files
             raise InputError(f"{path} is not a record of this package ({error})") from None
     record = Record.load(path)
     columns = [Column("time", record.time, "s")]

@@ -1,8 +1,8 @@
-"""Numbers of a machine that a profile remembers: which of them a file cannot be read without, and where from they are.
+"""Numbers of a machine in a profile: which of them a file requires, and where they come from.
 
-A profile that nobody named is found by the names of the columns, and those say nothing about the machine. What a column
-means holds for the next file; a rated torque, a lead or a gear ratio holds for the file that it was said for. Another
-file gets those alone without which its columns cannot be read, each with a warning.
+A profile without --profile is found by the names of the columns, which do not identify the machine. The meaning of a
+column is valid for the next file; a rated torque, a lead or a gear ratio is valid for the file for which it was given.
+Another file gets only the numbers without which its columns cannot be read, each with a warning.
 """
 
 from __future__ import annotations
@@ -30,36 +30,36 @@ UNITS = {
     "force_constant": ("N/A", "N_PER_A"), "lead": ("mm", "MM"), "sample_time": ("s", "S"), "gear_ratio": ("", "N"),
     "counts_per_rev": ("", "N"), "pole_pairs": ("", "N"), "side": ("", "motor"),
 }  # fmt: skip
-"""Unit in messages, and what help calls the option's value."""
+"""Unit in messages, and the placeholder of the option's value in the help."""
 BEHIND = {
     "speed": ("counts_per_rev", "pole_pairs", "gear_ratio", "lead"),
     "torque": ("torque_constant", "force_constant", "rated_torque", "rated_current", "gear_ratio", "lead"),
 }
-"""Numbers of the drive on which the size of a signal depends."""
+"""Numbers of the drive that scale a signal."""
 OTHER = 4.0
-"""Times as large, or as small, from which on it is asked whether they hold."""
+"""Ratio of sizes, or its inverse, above which the numbers are questioned."""
 FORGET = "delete that file to forget it"
 CODES = ("saved-numbers", "profile-misfit", "profile", "profile-idle")
-"""Of the findings that say what a saved profile did."""
+"""Codes of findings about a saved profile."""
 
 Picked = Mapping[str, tuple[Any, Statement]]
-"""Value and origin of numbers, by name."""
+"""Values and origins of numbers, by name."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recalled:
-    """What a profile that nobody named does for a file.
+    """Effect of an automatically found profile on a file.
 
     Attributes
     ----------
     profile : Profile
-        What the columns mean, and the numbers that are used.
+        The mapping of columns, and the numbers that are used.
     own : mapping
-        Numbers that were said for this very file.
+        Numbers given for this file.
     foreign : mapping
-        Numbers that were said for another.
+        Numbers given for another file.
     idle : mapping
-        Numbers that are kept and not used.
+        Numbers that are stored but not used.
     """
 
     profile: Profile
@@ -71,16 +71,16 @@ class Recalled:
 def recall(
     kept: Profile, table: Table, mapping: Sequence[str], said: Drive, given: Iterable[str], digest: str
 ) -> Recalled:
-    """What of a profile is used for a table.
+    """Return the effect of a profile on a table.
 
     Parameters
     ----------
     kept : Profile
     table : Table
     mapping : sequence of str
-        What is said of the columns now.
+        The current mapping.
     said : Drive
-        The numbers that are said now.
+        The current numbers.
     given : iterable of str
         Their names, `sample_time` and `side` among them.
     digest : str
@@ -105,7 +105,7 @@ def recall(
 
 
 def _latest(statements: Sequence[Statement], digest: str) -> dict[str, tuple[Any, Statement]]:
-    """The last word on every number; that of the file itself before any other."""
+    """Return the latest value of every number; those of the file itself have priority."""
     own = [s for s in statements if digest and s.sha256 == digest]
     out: dict[str, tuple[Any, Statement]] = {}
     for statement in (*own, *(s for s in reversed(statements) if s not in own)):
@@ -116,14 +116,14 @@ def _latest(statements: Sequence[Statement], digest: str) -> dict[str, tuple[Any
 
 
 def needed(choices: Sequence[Choice], table: Table, known: Mapping[str, Any]) -> set[str]:
-    """Numbers without which columns cannot be read as what they are.
+    """Return the numbers that are required to read the columns.
 
     Parameters
     ----------
     choices : sequence of Choice
     table : Table
     known : mapping
-        Numbers that are at hand, by name.
+        Known numbers, by name.
     """
     linear = is_linear({c.role: c for c in choices})
     kinds = {c.role: unit_of(c, linear).kind for c in choices}
@@ -136,7 +136,7 @@ def needed(choices: Sequence[Choice], table: Table, known: Mapping[str, Any]) ->
         out.add("rated_torque")
     if "share" in (kinds.get("current"), kinds.get("current_reference")):
         out.add("rated_current")
-    if "motor_torque" not in kinds:  # a current makes one, and a voltage drives a motor by it
+    if "motor_torque" not in kinds:  # a current gives a torque, and a voltage drives a motor with it
         out |= {"torque_constant", "force_constant"}
     if any(c.side == "load" for c in choices if c.role in (*MOTION, *EFFORT)):
         out |= {"gear_ratio", "side"}
@@ -153,12 +153,12 @@ def needed(choices: Sequence[Choice], table: Table, known: Mapping[str, Any]) ->
 
 
 def _shape(kind: str) -> str:
-    """Whether a quantity is one of turning or of moving along a line."""
+    """Return whether a quantity is rotary or linear."""
     return "along" if kind in ("length", "velocity", "acceleration", "force") else "turning"
 
 
 def digest_of_file(path: Path) -> str:
-    """SHA-256 of a file; empty for a folder."""
+    """Return the SHA-256 of a file; empty for a folder."""
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
 
 
@@ -169,10 +169,10 @@ def kept_now(
     kept: Profile | None, record: Record, mapping: Sequence[str], said: Drive, period: float | None, path: Path,
     digest: str,
 ) -> Profile:  # fmt: skip
-    """The profile with what was said for this file."""
+    """Return the profile with the numbers given for this file."""
     before = kept or Profile({}, Drive())
     columns: list[dict[str, Any]] = record.meta["reading"]["columns"]
-    # What a number of the drive told of a column's unit is what the column means.
+    # A unit that followed from a number of the drive belongs to the column.
     told = {c["channel"]: f"{c['column']}:{c['unit']}" for c in columns if c["source"] == "drive"}
     meanings = {**before.mapping, **told, **parse_mapping(mapping)}
     new = Statement(said, period)
@@ -193,7 +193,7 @@ def kept_now(
 
 
 def findings_of(path: Path, recalled: Recalled, mapping: Sequence[str], record: Record) -> list[Finding]:
-    """What the profile at `path` did, beyond the mapping that is said now."""
+    """Return findings about the effect of the profile at `path`, in addition to the current mapping."""
     out = [*_foreign(recalled.foreign), *_misfits(recalled.foreign, record)]
     if words := _applied(path, recalled.profile.mapping, recalled.own, mapping):
         out.append(Finding("note", "profile", words, remedy=FORGET))
@@ -209,14 +209,14 @@ def findings_of(path: Path, recalled: Recalled, mapping: Sequence[str], record: 
 def blamed(
     error: InputError, path: Path, kept: Profile, recalled: Recalled | None, mapping: Sequence[str]
 ) -> InputError:
-    """An error of a file that the profile at `path` had a part in: it names that; as it is where it had none."""
+    """Return the error of a file, which names the profile at `path` if that had an effect."""
     numbers = {**recalled.own, **recalled.foreign} if recalled else {}
     words = _applied(path, kept.mapping, numbers, mapping)
     return InputError(f"{error}; the file was {words}: {FORGET}") if words else error
 
 
 def _applied(path: Path, meanings: Mapping[str, str], numbers: Picked, mapping: Sequence[str]) -> str:
-    """What a profile says beyond the mapping that is said now, in words; empty where that is nothing."""
+    """Return the effect of a profile in addition to the current mapping, as text; empty if there is none."""
     said = parse_mapping(mapping)
     more = [_meaning(role, text) for role, text in meanings.items() if role not in said]
     more += [f"{name} = {x}" for name, (x, _) in numbers.items()]
@@ -224,7 +224,7 @@ def _applied(path: Path, meanings: Mapping[str, str], numbers: Picked, mapping: 
 
 
 def _meaning(role: str, text: str) -> str:
-    """What a channel is, and that its sign is turned where it is."""
+    """Return the meaning of a channel, and whether its sign is inverted."""
     turned = ":" in text and text.rsplit(":", 1)[1].lstrip().startswith("-")
     return f"{role}={text}" + (" (the sign turned)" if turned else "")
 
@@ -244,7 +244,7 @@ def _foreign(foreign: Picked) -> list[Finding]:
 
 
 def _misfits(foreign: Picked, record: Record) -> list[Finding]:
-    """What asks whether numbers hold for this record: of another size than the one that they were said for."""
+    """Return a warning if the record has another size than that for which the numbers were given."""
     out: list[Finding] = []
     now = sizes(record)
     for origin, names in _by_origin(foreign):
@@ -268,7 +268,7 @@ def _misfits(foreign: Picked, record: Record) -> list[Finding]:
 
 
 def _by_origin(picked: Picked) -> list[tuple[Statement, list[str]]]:
-    """Names by the statement that they are from."""
+    """Group names by their statement."""
     out: list[tuple[Statement, list[str]]] = []
     for name, (_, origin) in picked.items():
         found = next((names for known, names in out if known is origin), None)
@@ -284,7 +284,7 @@ def _where(origin: Statement) -> str:
 
 
 def _shown(name: str, value: Any) -> str:
-    """The value as its option takes it: the lead in mm."""
+    """Return the value in the unit of its option: the lead in mm."""
     if isinstance(value, str):
         return value
     shown = 1e3 * value if name == "lead" else value

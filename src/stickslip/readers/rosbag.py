@@ -1,7 +1,7 @@
-"""ROS bags: ROS 1 files, ROS 2 folders and single MCAP files, by rosbags (Apache-2.0, an extra: `stickslip[rosbag]`).
+"""Read ROS bags: ROS 1 files, ROS 2 folders and single MCAP files, by rosbags (Apache-2.0, extra `stickslip[rosbag]`).
 
-Every numeric field of every topic becomes a column named TOPIC.FIELD; the elements of an array with names beside them,
-as in sensor_msgs/JointState, are named after them. Times are those of the message's header, else of its arrival.
+Every numeric field of every topic becomes a column TOPIC.FIELD; the elements of an array that has names, as in
+sensor_msgs/JointState, use these. Times are those of the message's header, else of its arrival.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from stickslip.readers.table_columns import Column, Format, Table
 
 MAX_ELEMENTS = 64
 CHECKED = 100_000
-"""Numbers after which memory is checked again."""
+"""Count of numbers after which memory is checked again."""
 LISTED = re.compile(r"""["']?([^\s"'\[\],]+\.(?:db3|mcap|zstd))\b""")
-"""Files that metadata.yaml names."""
+"""The files named in metadata.yaml."""
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """A folder with metadata.yaml, or the signature of ROS 1 or MCAP."""
+    """Accept a folder with metadata.yaml, or the signature of ROS 1 or MCAP."""
     return (path.is_dir() and (path / "metadata.yaml").is_file()) or head.startswith(
         (b"#ROSBAG V", b"\x89MCAP0\r\n")
     )
 
 
 def read(path: Path) -> Table:
-    """The numeric fields of every topic, with their clock."""
+    """Read the numeric fields of every topic, with their times."""
     if path.is_dir():
         _insist_on_own_files(path)
     needed("rosbags.highlevel", "rosbag", "ROS bags need")
@@ -43,7 +43,7 @@ def read(path: Path) -> Table:
 
 
 def _insist_on_own_files(folder: Path) -> None:
-    """Refuse a bag with a file outside its folder, by a link or by a path in metadata.yaml.
+    """Refuse a bag with a file outside its folder, through a link or a path in metadata.yaml.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def _read_here(path: Path) -> Table:
                     checked = count
     except (InputError, MemoryError):
         raise
-    except Exception as error:  # rosbags raises several kinds on a damaged bag
+    except Exception as error:  # rosbags raises several types of errors for damaged bags
         raise InputError(
             f"{path} cannot be read as a ROS bag ({type(error).__name__}: {error}); check that it is complete"
         ) from None
@@ -92,14 +92,14 @@ def _read_here(path: Path) -> Table:
 
 
 def _time(message: Any, stamp: int) -> float:
-    """The header's time in s, where it is set."""
+    """Return the header's time in s, if it is set."""
     header = getattr(getattr(message, "header", None), "stamp", None)
     told = float(header.sec) + 1e-9 * float(header.nanosec) if header is not None else 0.0
     return told if told > 0.0 else 1e-9 * stamp
 
 
 def _fields(message: Any, name: str, depth: int = 0) -> dict[str, float]:
-    """The numbers in a message by path."""
+    """Return the numbers in a message, by path."""
     out: dict[str, float] = {}
     fields: dict[str, Any] = getattr(message, "__dataclass_fields__", {})
     labels: Any = getattr(message, "name", ())
@@ -117,7 +117,7 @@ def _fields(message: Any, name: str, depth: int = 0) -> dict[str, float]:
 
 
 def _elements(values: np.ndarray[Any, Any], name: str, labels: Any) -> dict[str, float]:
-    """The numbers of a short array, by label where there is one for each, else by index."""
+    """Return the numbers of a short array, by label if each has one, else by index."""
     if not 0 < values.size <= MAX_ELEMENTS or values.dtype.kind not in "biuf":
         return {}
     named = not isinstance(labels, str) and len(labels) == values.size

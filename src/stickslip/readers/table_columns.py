@@ -1,4 +1,4 @@
-"""What a format's reader hands on: columns as they stand in the file, before anyone says what they mean."""
+"""Columns as they are in a file, before they are assigned to channels: the result of a format's reader."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ class Column:
     Attributes
     ----------
     name : str
-        As written in the file; the path of names, joined by dots, where the file has groups.
+        As written in the file; in files with groups the path of names, joined by dots.
     values : array, shape (n,)
-        As written: units are converted later. NaN where the file has no number.
+        As written: units are converted later. NaN if the file has no number.
     unit : str
-        As written; empty where the file says none.
+        As written; empty if the file states none.
     clock : array, shape (n,), or None
-        The column's own times in s, where the file gives columns times of their own.
+        The column's own times in s, if columns have their own times.
     channel : str
-        The channel that the format defines it to be, or "none" for a quantity that no channel holds; empty where only
-        the name and the unit indicate it.
+        The channel defined by the format, or "none" for a quantity that is not a channel; empty if only name and unit
+        indicate it.
     """
 
     name: str
@@ -48,15 +48,15 @@ class Table:
     ----------
     format : str
     columns : tuple of Column
-        Of different lengths where the file has several tables.
+        Their lengths differ if the file has several tables.
     constants : mapping of str to float or str
-        Single values found beside the columns.
+        Single values in the file.
     findings : tuple of Finding
-        What was odd about the file.
+        Findings about the file.
     unread : mapping of str to str
-        Name and first cell of columns that were left out, since they hold neither numbers nor a clock.
+        Name and first cell of columns that were left out because they have neither numbers nor times.
     runs : tuple of int
-        Rows, from 1, at which another record of the same axis starts: tests or episodes one after the other.
+        Rows, from 1, at which another record of the same axis starts, such as consecutive tests or episodes.
     """
 
     format: str
@@ -76,13 +76,14 @@ class Format:
     name : str
     title : str
     suffixes : tuple of str
-        Endings of file names, in lower case with their dot.
+        Suffixes of file names, in lower case with the dot.
     recognise : callable
-        ``recognise(head, path) -> bool``: whether the first 4096 bytes (none for a folder) begin such a file.
+        ``recognise(head, path) -> bool``: whether the first 4096 bytes (none for a folder) are the start of such a
+        file.
     read : callable
         ``read(path) -> Table``; raises `InputError` on a file it cannot read.
     extra : str
-        The extra of the package that brings what the format needs; empty where nothing is needed.
+        The extra of the package that the format requires; empty if none.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""TDMS, LabVIEW's format, by npTDMS (LGPL-3.0, an extra: `stickslip[tdms]`)."""
+"""Read TDMS, LabVIEW's format, by npTDMS (LGPL-3.0, extra `stickslip[tdms]`)."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from stickslip.readers.table_columns import Column, Format, Table
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """The tag of a segment."""
+    """Accept the tag of a segment."""
     return head.startswith(b"TDSm")
 
 
 def read(path: Path) -> Table:
-    """Every channel of numbers, with its unit and, where it is a waveform, its clock."""
+    """Read every numeric channel with its unit and, for a waveform, its times."""
     library = needed("nptdms", "tdms", "TDMS files need")
     columns: list[Column] = []
     try:
@@ -38,7 +38,7 @@ def read(path: Path) -> Table:
                     )
     except InputError:
         raise
-    except Exception as error:  # npTDMS raises several kinds on a damaged file
+    except Exception as error:  # npTDMS raises several types of errors for damaged files
         raise InputError(
             f"{path} cannot be read as TDMS ({type(error).__name__}: {error}); export it again"
         ) from None
@@ -46,7 +46,7 @@ def read(path: Path) -> Table:
 
 
 def _clock(channel: Any, count: int) -> Any:
-    """The times of a waveform in s from its start; None for plain data."""
+    """Return the times of a waveform in s from its start; None for plain data."""
     step = channel.properties.get("wf_increment")
     if step is None or not float(step) > 0.0:
         return None

@@ -1,7 +1,7 @@
-"""PX4 ULog (.ulg): every field of every topic, with the topic's clock.
+"""Read PX4 ULog (.ulg): every field of every topic, with the times of the topic.
 
 Format: PX4 User Guide, "ULog File Format". A log of a vehicle has hundreds of fields and no axis, and its torques are
-normalised commands. No field is therefore taken as a channel unless the user maps it.
+normalised commands. Therefore no field is assigned to a channel unless the user maps it.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ class _Topic:
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """Its signature."""
+    """Accept its signature."""
     return head.startswith(MAGIC)
 
 
 def read(path: Path) -> Table:
-    """Every number of every topic."""
+    """Read every number of every topic."""
     try:
         topics, constants, findings = _topics(path.read_bytes())
     except Damaged as error:
@@ -66,7 +66,7 @@ def read(path: Path) -> Table:
 
 
 def _topics(content: bytes) -> tuple[list[_Topic], dict[str, float | str], list[Finding]]:
-    """Topics with their samples, parameters and information, and what is odd about the file."""
+    """Return topics with their samples, parameters and information, and findings about the file."""
     formats: dict[str, str] = {}
     by_id: dict[int, _Topic] = {}
     constants: dict[str, float | str] = {}
@@ -108,7 +108,7 @@ def _topics(content: bytes) -> tuple[list[_Topic], dict[str, float | str], list[
 
 
 def _constant(body: bytes, constants: dict[str, float | str]) -> None:
-    """A parameter or an information: the type and name of one value, then the value. Of several, the first."""
+    """Read a parameter or an information: type and name of one value, then the value; of several, the first."""
     length = body[0] if body else 0
     match = FIELD.fullmatch(body[1 : 1 + length].decode("utf-8", "replace"))
     value = body[1 + length :]
@@ -122,7 +122,7 @@ def _constant(body: bytes, constants: dict[str, float | str]) -> None:
 
 
 def _columns(topic: _Topic) -> list[Column]:
-    """The numbers of a topic. Padding at the end of a message is not stored."""
+    """Return the numbers of a topic. Padding at the end of a message is not stored."""
     members = list(topic.members)
     while members and "._padding" in members[-1][0]:
         members.pop()

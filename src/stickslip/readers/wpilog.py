@@ -1,8 +1,8 @@
-"""WPILib data logs (.wpilog), version 1.x: every entry of numbers, with its own clock.
+"""Read WPILib data logs (.wpilog), version 1.x: every numeric entry, with its own times.
 
 Format: WPILib "Data Log File Format Specification, Version 1.0" and "Packed Struct Serialization Specification, Version
-1.0". Entries of type boolean, int64, float and double, arrays of them, and structs of numbers become columns; an
-entry's metadata gives its unit where it names one (as the routines of SysId write it, "Rotation per Second").
+1.0". Entries of type boolean, int64, float and double, arrays of them, and structs of numbers become columns; the unit
+is that of the entry's metadata, if any (as written by SysId, "Rotation per Second").
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ UNIT_NAMES = {
     "radians": "rad", "degree": "deg", "degrees": "deg", "newton meter": "Nm", "newton-meter": "Nm",
     "celsius": "degC", "second": "s", "seconds": "s",
 }  # fmt: skip
-"""Names of WPILib's units, in lower case, and how they are written here."""
+"""Names of WPILib's units, in lower case, and their form here."""
 PER = {"second": "s", "minute": "min"}
 
 
 @dataclass
 class _Entry:
-    """An entry of the log: what it is, and its samples."""
+    """An entry of the log, with its samples."""
 
     name: str
     kind: str
@@ -58,12 +58,12 @@ class _Entry:
 
 
 def recognise(head: bytes, path: Path) -> bool:
-    """Its signature."""
+    """Accept its signature."""
     return head.startswith(MAGIC)
 
 
 def read(path: Path) -> Table:
-    """Every entry of numbers as one or more columns; entries of other types are listed as not read."""
+    """Read every numeric entry as one or more columns; entries of other types are listed as not read."""
     content = path.read_bytes()
     try:
         entries, cut = _entries(content)
@@ -94,7 +94,7 @@ def read(path: Path) -> Table:
 
 
 def _entries(content: bytes) -> tuple[list[_Entry], int]:
-    """Return the entries with their samples, one a name, and the byte at which the file is cut off (0: it is whole)."""
+    """Return the entries with their samples, one per name, and the byte at which the file is cut off (0: complete)."""
     if len(content) < HEADER or content[7] != 1:
         raise Damaged("its version is not 1" if len(content) >= HEADER else "it ends in its header")
     by_id: dict[int, _Entry] = {}
@@ -115,7 +115,7 @@ def _entries(content: bytes) -> tuple[list[_Entry], int]:
 
 
 def _records(content: bytes, at: int) -> Iterator[tuple[int, int, bytes]]:
-    """Entry, time in µs and payload of every record; entry -1 and the place where the file is cut off."""
+    """Yield entry, time in µs and payload of every record; entry -1 and the position where the file is cut off."""
     end = len(content)
     while at < end:
         bits = content[at]
@@ -124,7 +124,7 @@ def _records(content: bytes, at: int) -> Iterator[tuple[int, int, bytes]]:
         time_end = size_end + 1 + (bits >> 4 & 7)
         size = int.from_bytes(content[entry_end:size_end], "little")
         if time_end + size > end:
-            # The log of a robot that is switched off ends in zeros or half a record.
+            # If a robot is switched off, its log ends in zeros or an incomplete record.
             if any(content[at:]):
                 yield -1, at, b""
             return
@@ -135,14 +135,14 @@ def _records(content: bytes, at: int) -> Iterator[tuple[int, int, bytes]]:
 
 
 def _control(payload: bytes, by_id: dict[int, _Entry], by_name: dict[tuple[str, str], _Entry]) -> None:
-    """Start or finish an entry, or change its metadata. A damaged record of this kind changes nothing."""
+    """Start or finish an entry, or change its metadata. Damaged records of this kind are ignored."""
     if len(payload) < 5:
         return
     number = int.from_bytes(payload[1:5], "little")
     texts = _strings(payload[5:])
     if payload[0] == 0 and len(texts) == 3:
         name, kind, metadata = texts
-        # An entry that was finished and started again goes on.
+        # An entry that is finished and started again continues.
         entry = by_name.setdefault((name, kind), _Entry(name, kind, metadata))
         by_id[number] = entry
     elif payload[0] == 1:
@@ -152,7 +152,7 @@ def _control(payload: bytes, by_id: dict[int, _Entry], by_name: dict[tuple[str, 
 
 
 def _strings(data: bytes) -> list[str]:
-    """Texts, each after its length."""
+    """Read strings, each after its length."""
     out: list[str] = []
     at = 0
     while at + 4 <= len(data):
@@ -172,7 +172,7 @@ def _text(data: bytes) -> str:
 
 
 def _columns(entry: _Entry, schemas: dict[str, str]) -> list[Column]:
-    """Return the columns of an entry; an empty list if its samples differ in size."""
+    """Return the columns of an entry, or an empty list if its samples differ in size."""
     sizes = {len(sample) for sample in entry.samples}
     if len(sizes) != 1:
         return []
@@ -183,7 +183,7 @@ def _columns(entry: _Entry, schemas: dict[str, str]) -> list[Column]:
     order = np.argsort(np.array(entry.times, dtype=np.int64), kind="stable")
     clock = 1e-6 * np.array(entry.times, dtype=np.float64)[order]
     rows = np.frombuffer(b"".join(entry.samples), dtype=layout)[order]
-    # Poses and speeds of the robot: an x of a struct is no position of an axis.
+    # Poses and speeds of the robot: the x of a struct is not the position of an axis.
     channel = "none" if entry.kind.startswith("struct:") else ""
     return columns_of(entry.name, members, rows, clock, _unit(entry.metadata), channel)
 
@@ -205,7 +205,7 @@ def _members(kind: str, size: int, schemas: dict[str, str]) -> list[Member]:
 
 
 def _unit(metadata: str) -> str:
-    """The unit that an entry's metadata names: alone, or under "unit" or "units" of a JSON object."""
+    """Return the unit in an entry's metadata: alone, or under "unit" or "units" of a JSON object."""
     text = metadata.strip()
     if text.startswith("{"):
         try:

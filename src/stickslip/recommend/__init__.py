@@ -1,1 +1,1 @@
-"""From an identified model to a setting of a compensator that is safe to switch on."""
+"""Recommend a compensator setting that is safe to switch on, from an identified model."""

@@ -1,11 +1,12 @@
-"""Axes on which a setting is tried: the best estimate, and others that the record allows.
+"""Sample the axes on which a setting is tested: the best estimate, and others within the intervals.
 
-Drawn are the identified numbers (friction, inertia, offset) from their intervals, and what no model holds but every
-machine has: a torque over the position of up to the misfit of the model, a current loop, a delay below one sample, and
-friction that comes later than the contact's own springs bring it (an elastic drivetrain, backlash), and a reference
-velocity of the instant or of the sample before. Where the record told motor and load behind a spring, they are drawn
-from its intervals, with friction at the load. On the best estimate the reference velocity is formed as the measured one
-is, the mean over the sample before: half a sample of difference between them acts as inertia that is fed forward.
+The identified numbers (friction, inertia, offset) are drawn from their intervals, and so are effects that every machine
+has but no model contains: a torque over the position of up to the model's misfit, a current loop, a delay below one
+sample, friction that builds up later than by the contact's own springs (elastic drivetrain, backlash), and a reference
+velocity at the instant or averaged over the previous sample. If an elastically coupled load was identified, motor and
+load are drawn from its intervals, with friction at the load. On the best estimate the reference velocity is formed like
+the measured one, as the mean over the previous sample, because a difference of half a sample acts like an inertia
+feedforward.
 """
 
 from __future__ import annotations
@@ -31,35 +32,36 @@ from stickslip.model import Model
 from stickslip.recommend.plant import Plant
 
 CURRENT_LOOP = (200.0, 2000.0)
-"""Hz, bandwidths drawn."""
+"""Range of sampled current loop bandwidths, Hz."""
 PROMPT = 0.3
-"""Chance of a drive that follows at once."""
+"""Probability of a drive without lag."""
 ORDERS = (1.0, 50.0)
-"""Per revolution (rotary), of torques over the position."""
+"""Range of sampled orders of the torque over the position, per revolution (rotary)."""
 WAVELENGTHS = (1e-3, 5e-2)
 """m (linear)"""
 WAVES = 3
-"""At most so many at once."""
+"""Largest number of simultaneous orders."""
 LEFT = ("sliding_rms_Nm", "sliding_rms_N")
-"""What an identification leaves of the torque in gross sliding: as large they are at most (RMS)."""
+"""Misfit of the torque in gross sliding; upper limit of the sampled torque over the position (RMS)."""
 BREAKAWAY = (3e-5, 3e-3)
-"""rad (a tenth of it in m), displacement at which a contact without springs in its law is taken to break away."""
+"""Range of the break-away displacement of a contact without springs in its law, rad (a tenth of it in m)."""
 LOST = 0.5
-"""Chance of a drawn axis that friction comes later than the contact's own springs bring it."""
+"""Probability that friction of a sampled axis builds up later than by the contact's own springs."""
 LOST_MOTION = (1e-4, 1e-2)
-"""rad (a tenth of it in m), displacement over which it then comes."""
+"""Range of the displacement over which it then builds up, rad (a tenth of it in m)."""
 MOST_STATIC = 2.0
-"""Static over Coulomb torque at most, where the record does not tell it: contacts of machines have 1 to 2."""
+"""Largest ratio of static to Coulomb torque if it is not identified: contacts of machines have 1 to 2."""
 HIDDEN = (0.1, 0.6)
-"""Of the slowest gross sliding: velocities of a fall of which a tenth at most is left there (exp(-1/0.6²) = 6 %)."""
+"""Stribeck velocities, relative to the slowest gross sliding, with which at most a tenth of the Stribeck effect remains
+there (exp(-1/0.6²) = 6 %)."""
 MOST_VISCOUS = 9.0
-"""Times the viscous friction found, where the record does not tell it."""
+"""Range of the viscous friction relative to the estimate, if it is not identified."""
 GIVEN = 0.1
-"""Part of an inertia to which a user knows it."""
+"""Relative uncertainty of an inertia given by the user."""
 DAMPING = 0.3
-"""Of the bristles, part of critical."""
+"""Damping ratio of the bristles."""
 DAMPED = (0.01, 0.1)
-"""Of the spring between motor and load, part of critical, drawn."""
+"""Range of the damping ratio of the spring between motor and load."""
 
 
 def plants_of(
@@ -73,7 +75,7 @@ def plants_of(
     delay: float | None = None,
     reference_velocity: ReferenceVelocity | None = None,
 ) -> Iterator[Plant]:
-    """The best estimate, and `count` axes drawn; about another inertia as wide in proportion.
+    """Return the best estimate and `count` sampled axes; another inertia keeps the relative width of its interval.
 
     Parameters
     ----------
@@ -83,16 +85,17 @@ def plants_of(
     count : int
     seed : int
     start : float
-        Position at which the motion begins, rad: where a pendulum hangs.
+        Position at the start of the motion, rad, which matters for a pendulum.
     given : bool
-        Whether the inertia is one that the user knows: then to `GIVEN`, where the record does not tell it.
+        Whether the inertia is given by the user; if the record does not determine it, its uncertainty is `GIVEN`.
     machine : Machine, optional
-        The machine at hand: its delay, current loop, springs and torques over the position are not drawn then, but the
-        angle at which the motion begins, and the noise.
+        The user's machine: its delay, current loop, springs and torques over the position are then fixed; start angle
+        and noise are sampled.
     delay : float, optional
-        By which the drive's commands act late, samples; drawn, up to one, where neither this nor a machine says it.
+        Command delay of the drive, samples; sampled up to one unless this or a machine gives it.
     reference_velocity : {"difference", "instant"}, optional
-        How the drive forms its reference velocity; drawn, and the difference on the best estimate, unless given.
+        How the drive forms its reference velocity; unless given it is sampled, with the difference on the best
+        estimate.
     """
     known = {name: float(found.axis.get(name, 0.0) or 0.0) for name in ("offset", "gravity", "gravity_angle")}
     yield Plant(
@@ -133,10 +136,10 @@ def plants_of(
 
 
 def plausible(estimates: Sequence[Estimate], seed: int) -> Callable[[dict[str, float]], None]:
-    """Brings what no record told to what machines have.
+    """Limit numbers that are not identified to the range of real machines.
 
-    Static torque lies between Coulomb's and `MOST_STATIC` times it; viscous friction anywhere from none to the upper
-    end of its interval: what one record puts on it may be another's Coulomb torque.
+    Static torque is between the Coulomb torque and `MOST_STATIC` times it; viscous friction from none to the upper
+    bound of its interval, because one record may attribute to it what another attributes to Coulomb friction.
     """
     untold = {e.name: e for e in estimates if not e.identified}
     rng = np.random.default_rng([seed, 1])
@@ -153,12 +156,12 @@ def plausible(estimates: Sequence[Estimate], seed: int) -> Callable[[dict[str, f
 
 
 def _between(rng: np.random.Generator, low: float, high: float) -> float:
-    """Log-uniform."""
+    """Draw from a log-uniform distribution."""
     return math.exp(float(rng.uniform(math.log(low), math.log(high))))
 
 
 def _late(rng: np.random.Generator, known: float | None) -> dict[str, Any]:
-    """Delay (samples; that which is known) and current loop of a drive; of some, none."""
+    """Draw the delay (samples, unless known) and current loop of a drive; some have no lag."""
     prompt, delay, bandwidth = float(rng.uniform()), float(rng.uniform()), _between(rng, *CURRENT_LOOP)
     late = {} if prompt < PROMPT else {"delay": delay, "bandwidth": bandwidth}
     if known is not None:
@@ -167,7 +170,7 @@ def _late(rng: np.random.Generator, known: float | None) -> dict[str, Any]:
 
 
 def _swinging(train: TwoInertias | None, inertia: float, rng: np.random.Generator) -> TwoMassAxis | None:
-    """Motor and load of these intervals; none where the record told none."""
+    """Draw motor and load within their intervals; None if no load was identified."""
     if train is None:
         return None
     frequency, share = (
@@ -177,12 +180,12 @@ def _swinging(train: TwoInertias | None, inertia: float, rng: np.random.Generato
 
 
 def told_of(machine: Machine | None) -> bool:
-    """Whether the torques over the position are the machine's own."""
+    """Whether the torques over the position are those of the machine."""
     return machine is not None and bool(machine.cogging.order or machine.contact.ripple.order)
 
 
 def _turned(machine: Machine, rng: np.random.Generator) -> dict[str, Any]:
-    """The machine at hand, begun at another angle, with other noise."""
+    """Return the user's machine with another start angle and other noise."""
     angle, seed = float(rng.uniform(0.0, 2.0 * math.pi)), int(rng.integers(1 << 31))
     return {
         "machine": replace(machine, start_angle=angle, seed=seed), "backward": bool(rng.uniform() < 0.5),
@@ -190,12 +193,12 @@ def _turned(machine: Machine, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _hanging(gravity: float, angle: float, start: float) -> tuple[tuple[float, float, float], ...]:
-    """- gravity sin(q - angle) as a wave of the position from where the motion begins."""
+    """Return - gravity sin(q - angle) as a wave of the position, relative to the start of the motion."""
     return ((1.0, gravity, 0.5 * math.pi + start - angle),) if gravity else ()
 
 
 def _unmodelled(rms: float, motion: str, rng: np.random.Generator) -> tuple[tuple[float, float, float], ...]:
-    """A torque over the position, such as cogging, of this size, N·m RMS."""
+    """Draw a torque over the position, such as cogging, of this size, N·m RMS."""
     count = int(rng.integers(1, WAVES + 1))
     out: list[tuple[float, float, float]] = []
     for _ in range(count):
@@ -209,10 +212,10 @@ def _unmodelled(rms: float, motion: str, rng: np.random.Generator) -> tuple[tupl
 def _with_springs(
     model: Model, inertia: float, motion: str, rng: np.random.Generator, most: float = math.inf
 ) -> Model:
-    """LuGre with the law's own sliding curve, that breaks away after a way that is drawn: where the law has no springs,
-    and else with a chance of `LOST`, for an elastic drivetrain or backlash between the encoder and the friction.
+    """Return LuGre with the law's own sliding curve and a sampled break-away displacement, if the law has no springs;
+    else with probability `LOST`, for an elastic drivetrain or backlash between encoder and friction.
 
-    The way is `most`, rad (m), at most: within that the record has seen friction built up again.
+    The displacement is at most `most`, rad (m), over which the record shows that friction builds up again.
     """
     if model.law.name not in ("coulomb", "stribeck", "lugre"):
         return model
@@ -244,8 +247,8 @@ def _with_springs(
 
 
 def _falling(model: Model, found: Identified, rng: np.random.Generator) -> Model:
-    """Return a Coulomb law with the fall of friction that the record shows, or with one below the slowest gross
-    sliding, which no record excludes; other laws as they are."""
+    """Return a Coulomb law with the Stribeck effect that the record shows, or with one below the slowest gross sliding,
+    which no record excludes; other laws unchanged."""
     fall, slowest = missing_fall(found.misfit), found.misfit.get("slowest_sliding", 0.0)
     if model.law.name != "coulomb":
         return model
@@ -260,22 +263,22 @@ def _falling(model: Model, found: Identified, rng: np.random.Generator) -> Model
 
 
 def _with_fall(model: Model, falls: Sequence[float], vs: float) -> Model:
-    """Coulomb's law with so much more friction at rest in each direction, N·m, that falls with a velocity, rad/s."""
+    """Return Coulomb's law with additional friction at rest in each direction, N·m, and a Stribeck velocity, rad/s."""
     own: Any = model.parameters
     curve: dict[str, Any] = {}
     for way, fall in zip(_ways(model), falls, strict=True):
         level = float(getattr(own, f"fc{way}"))
         curve |= {f"fs{way}": level + fall, f"fc{way}": level, f"vs{way}": vs}
         curve[f"sigma2{way}"] = float(getattr(own, f"sigma2{way}"))
-    # Of its stiffness nothing is left once springs are drawn.
+    # Its stiffness is replaced when springs are drawn.
     return Model("stribeck", _choices(model), k=float(own.fc) / 1e-3, **curve)
 
 
 def _ways(model: Model) -> tuple[str, ...]:
-    """How the parameters of each direction end: one ending where both are the same."""
+    """Return the suffixes of the parameters of each direction; one if both are equal."""
     return ("",) if model.law.chosen.get("symmetry", "symmetric") == "symmetric" else ("", NEGATIVE)
 
 
 def _choices(model: Model) -> dict[str, str]:
-    """Curve, viscous part and whether both directions are the same, where the law has the choice."""
+    """Return curve, viscous part and whether both directions are equal, if the law has these choices."""
     return {k: v for k, v in model.law.chosen.items() if k in ("curve", "viscous", "symmetry")}

@@ -1,9 +1,9 @@
-"""Compensators of the catalogue on the axes of a recommendation: observers, adaptation, sliding modes, resets; and
-controllers of the user's own.
+"""Test compensators of the catalogue (observers, adaptation, sliding modes, resets) and the user's own controllers on
+the axes of a recommendation.
 
-Each of the catalogue is made for the axis from the identified law, and every one run as the settings of a law are;
-besides, on the best estimate it rests for as long as slow limit cycles take. What has been found not worth switching on
-is not run, and the reason said. A controller of one's own is run as it is.
+Compensators of the catalogue are designed from the identified law, and run like the settings of a law. On the best
+estimate each also rests long enough for slow limit cycles to appear. Compensators that are known to be unsuitable are
+not run, and the reason is reported. The user's own controllers are run unchanged.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from stickslip.recommend.long_rest import swing_for_long
 
 @dataclass(frozen=True, eq=False)
 class Own:
-    """A whole controller of the user's, to be tried besides.
+    """A complete controller of the user to test in addition.
 
     Attributes
     ----------
     name : str
-        What the output calls it.
+        Name in the output.
     controller : Controller
     """
 
@@ -43,23 +43,23 @@ class Own:
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """A compensator of the catalogue in a loop, or a controller of the user's, and what it did on every axis.
+    """A compensator of the catalogue in a loop, or a controller of the user, with its results on every axis.
 
     Attributes
     ----------
     name, loop : str
-        Of `stickslip.control.catalogue`, or `Own`; loop is empty where the compensator is the loop.
+        Of `stickslip.control.catalogue`, or `Own`; loop is empty if the compensator is the loop.
     errors : tuple of float
-        RMS position error along the motion over that of the linear controller alone, one per axis, the best estimate
-        first; empty where it was not run.
+        RMS position error along the motion relative to that of the linear controller alone, one per axis, the best
+        estimate first; empty if it was not run.
     why_not : str
-        Why it is not to be switched on, or "".
+        Reason for rejection, or "".
     controller : Controller or None
-        None where it cannot be made for this axis.
+        None if it cannot be designed for this axis.
     learned : mapping
-        What it has learned on the best estimate, along the motion (`stickslip.control.learned.plain`).
+        Parameters learned on the best estimate, along the motion (`stickslip.control.learned.plain`).
     confirmed : tuple of float
-        As `errors`, on axes that it was not chosen on; empty where it is not the one that is switched on.
+        As `errors`, on axes that were not used for its selection; empty if it is not the one to switch on.
     """
 
     name: str
@@ -78,17 +78,17 @@ class Beside:
 
     @property
     def worst(self) -> float:
-        """The greatest remaining part of the error, on axes that all were tried on."""
+        """The largest remaining share of the error, on the axes on which all were tested."""
         return max(self.errors, default=math.inf)
 
     @property
     def at_most(self) -> float:
-        """The greatest remaining part of the error on all axes."""
+        """The largest remaining share of the error on all axes."""
         return max((self.worst, *self.confirmed))
 
     @property
     def adapts(self) -> bool:
-        """Whether what it has learned acts on the axis."""
+        """Whether its learned parameters act on the axis."""
         return self.controller is not None and any(b.law.adapts for b in self.controller.blocks.values())
 
     def as_dict(self) -> dict[str, Any]:
@@ -100,7 +100,7 @@ class Beside:
 
 
 def belief_of(model: Model, drive: Drive, inertia: float) -> Belief:
-    """What is believed of an axis: its identified law, and the drive; of a given loop the bandwidth that it comes to.
+    """Return the nominal plant: the identified law and the drive; for a given loop its effective bandwidth.
 
     Raises
     ------
@@ -109,8 +109,8 @@ def belief_of(model: Model, drive: Drive, inertia: float) -> Belief:
     """
     if drive.controller is not None:
         raise ParameterError(
-            "compensators of the catalogue bring their own loop; leave controller out, or name files of "
-            "controllers of your own alone"
+            "compensators of the catalogue have their own loop; leave controller out, or name only files of "
+            "your own controllers"
         )
     bandwidth = drive.bandwidth
     if drive.gains is not None:
@@ -131,21 +131,21 @@ def tried_beside(
     inertia: float = 0.0,
     offset: float = 0.0,
 ) -> tuple[Beside, ...]:
-    """The compensators of those names, the one to be switched on first: the best, or of those as good one that adapts
-    nothing, since nothing in it can drift. The rest follow by their errors, then those that are not safe.
+    """Test the named compensators and return them, the one to switch on first: the best, or an equally good one without
+    adaptation, because it cannot drift. The rest follow by their errors, then the unsafe ones.
 
     The best is confirmed on the other axes.
 
     Parameters
     ----------
     names : sequence of str or Own
-        Of the catalogue, and controllers of the user's.
+        Of the catalogue, and controllers of the user.
     belief : Belief or None
-        Of the axis; what is of the catalogue needs one.
+        Of the axis; required for compensators of the catalogue.
     bench, others : Bench
-        Axes on which they are chosen, and confirmed.
+        Axes for selection and for confirmation.
     inertia, offset : float
-        kg·m² and N·m, fed forward with each of the catalogue as with the settings of a law.
+        Feedforward of inertia and constant torque, kg·m² and N·m, with each compensator of the catalogue.
     """
     found = [
         on_axes(Beside(own.name, "", (), "", own.controller), bench, " ")
@@ -171,16 +171,18 @@ def tried_beside(
 
 
 def passed_over(one: Beside, taken: Beside) -> Beside:
-    """Beside the one that is taken: why not one with a smaller error, which `tried_beside` passes over."""
+    """Return the reason why `tried_beside` does not select a compensator with a smaller error."""
     return (
-        replace(one, why_not=f"it adapts, and {taken.label} is as good") if one.worst < taken.worst else one
+        replace(one, why_not=f"it adapts, and {taken.label} is equally good")
+        if one.worst < taken.worst
+        else one
     )
 
 
 def judged(
     name: str, loop: str, belief: Belief, bench: Bench, inertia: float = 0.0, offset: float = 0.0
 ) -> Beside:
-    """One of them on every axis, up to the first on which it is not safe."""
+    """Test one of them on every axis, up to the first on which it is unsafe."""
     try:
         made = compensated(name, loop or LOOPS[0], belief)
     except ParameterError as error:
@@ -195,7 +197,7 @@ def judged(
 
 
 def fed(made: Controller, inertia: float, offset: float) -> Controller:
-    """The controller with inertia and offset fed forward; without the inertia where it feeds one forward itself."""
+    """Return the controller with feedforward of inertia and offset; without the inertia if it has its own."""
     inertia = 0.0 if made.answers_to_acceleration else inertia
     if inertia == offset == 0.0:
         return made
@@ -204,13 +206,13 @@ def fed(made: Controller, inertia: float, offset: float) -> Controller:
 
 
 def feeds_friction(made: Controller) -> bool:
-    """Whether it feeds forward more than inertia and offset."""
+    """Whether its feedforward contains more than inertia and offset."""
     laws = [block.law for block in made.blocks.values() if block.law.place == "feedforward"]
     return any(law.accelerating is None for law in laws)
 
 
 def refused(name: str, made: Controller, belief: Belief, drive: Drive) -> str:
-    """Why it is not even run, or ""."""
+    """Return the reason why it is not run, or ""."""
     if name == "lugre-observer":
         stiffness, late = belief.number("sigma0"), math.ceil(drive.latest)
         said = objection(made, belief.inertia, stiffness, drive.encoder_counts, delay=late)
@@ -220,12 +222,12 @@ def refused(name: str, made: Controller, belief: Belief, drive: Drive) -> str:
         return CATALOGUE[name].against
     laws = [block.law for block in made.blocks.values()]
     if any(law.adapts for law in laws) and not any(law.integrates for law in laws):
-        return "it adapts, and nothing under it moves an axis that sticks"
+        return "it adapts, and nothing else in it moves a sticking axis"
     return ""
 
 
 def confirmed(best: Beside, bench: Bench, others: Bench) -> Beside:
-    """It on the other axes, and at rest for long on the best estimate."""
+    """Test it on the other axes, and at long rest on the best estimate."""
     assert best.controller is not None
     if cycle := limit_cycle(best.controller, bench, 0):
         return replace(best, why_not=cycle)
@@ -234,7 +236,7 @@ def confirmed(best: Beside, bench: Bench, others: Bench) -> Beside:
 
 
 def on_axes(beside: Beside, bench: Bench, where: str) -> Beside:
-    """It on every axis of a bench; why it is not safe on one of them."""
+    """Test it on every axis of a bench; return errors and the reason why it is unsafe on one of them."""
     controller = beside.controller
     assert controller is not None
     errors: list[float] = []
@@ -245,16 +247,17 @@ def on_axes(beside: Beside, bench: Bench, where: str) -> Beside:
         beside = replace(beside, learned=beside.learned or after.learned)
         unsafe = unsafe_at(beside, before, after, bench.drive)
         if AT_REST in unsafe and not limit_cycle(controller, bench, i):
-            unsafe.remove(AT_REST)  # it came to rest later: a jump back behind the motion is no limit cycle
+            unsafe.remove(AT_REST)  # it came to rest later: a jump back after the motion is not a limit cycle
         if unsafe:
             return replace(beside, errors=tuple(errors), why_not=", ".join(unsafe) + where.rstrip())
     return replace(beside, errors=tuple(errors))
 
 
 def unsafe_at(beside: Beside, before: Trial, after: Trial, drive: Drive) -> list[str]:
-    """What it makes worse; the linear controller itself makes nothing worse.
+    """Return the dangers that it adds to those of the linear controller.
 
-    A feedforward kicks where the motion turns, also one that has an observer under it: it may be as rough as one alone.
+    A feedforward kicks at reversals, even in combination with an observer, so it may be as rough as a feedforward
+    alone.
     """
     assert beside.controller is not None
     if math.isclose(after.moving["position_rms_rad"], before.moving["position_rms_rad"], rel_tol=1e-3):
@@ -267,8 +270,8 @@ def unsafe_at(beside: Beside, before: Trial, after: Trial, drive: Drive) -> list
 
 
 def limit_cycle(controller: Controller, bench: Bench, axis: int) -> str:
-    """What it does at rest for long after the motion on one of the axes, where it goes to and fro, or ""."""
+    """Return a description of its limit cycle at long rest after the motion on one of the axes, or ""."""
     swing = swing_for_long(controller, bench, axis)
     if math.isinf(swing):
-        return "at rest position or velocity left every reasonable bound"
+        return "at rest position or velocity exceeded all reasonable limits"
     return f"hunts at rest, {1e6 * swing:.0f} µrad peak to peak" if swing > 0.0 else ""

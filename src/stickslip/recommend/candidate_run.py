@@ -1,5 +1,6 @@
-"""One setting of a compensator on one axis, as a drive runs it: along a motion, and at rest behind it; and the linear
-controller alone, which may ring by itself: a count of the encoder looks like kd count / sample time of speed."""
+"""Simulate one setting of a compensator on one axis, as in the drive: along a motion and at rest after it; and the
+linear controller alone, which may ring by itself, because one encoder count causes a torque of kd times count divided
+by sample time."""
 
 from __future__ import annotations
 
@@ -32,72 +33,74 @@ AT_REST = "limit cycle at rest"
 IN_MOTION = "oscillates in motion"
 ROUGH_MOTION = "rough motion"
 LARGER = "a larger error than without it"
-LEFT = "position or velocity left every reasonable bound"
+LEFT = "position or velocity exceeded all reasonable limits"
 
 BUSY = 1.0
-"""Reversals per second beyond those of the linear controller alone from which an axis hunts."""
+"""Reversals per second in addition to those of the linear controller alone above which an axis hunts."""
 BOUNCES = 2.0
-"""Swings that a compensating torque may make where the motion stops or turns: its springs give back the step."""
+"""Swings that a compensating torque may cause at a stop or reversal, when the springs release the step."""
 LIVELIER, ROUGH = 3.0, 0.1
-"""Rough is a velocity above 50 Hz beyond so many times the linear controller's and this part of the reference's RMS."""
+"""Motion is rough if the velocity above 50 Hz exceeds this multiple of the linear controller's and this share of the
+reference's RMS."""
 KICKS = 0.5
-"""The same of a feedforward, which excites the contact's springs where it turns but cannot ring with them."""
+"""The same for a feedforward, which excites the contact's springs at reversals but cannot ring with them."""
 SWINGS = (2.0, 0.03)
-"""Counts, and part of the linear controller's RMS error, that a swing back has at least: less is none."""
+"""Smallest swing, in counts and as a share of the linear controller's RMS error."""
 TRIGGER = 1e-3
-"""rad/s: a slower reversal between two counts is none."""
+"""rad/s: slower reversals between two counts are not counted."""
 FAST = 50.0
 """Hz"""
 STARTS = (0.45, 1.4)
-"""Counts from which the linear controller goes to rest half way between two counts, where a creeping axis ends up."""
+"""Start, in counts, from which the linear controller moves to a position half way between two counts, where a creeping
+axis ends."""
 SLOWEST = 0.01
-"""Of the motion's frequency: the least bandwidth that is looked at."""
+"""Lowest bandwidth, relative to the motion's frequency."""
 SMALLEST = 1e-12
-"""rad (m), of a motion."""
+"""Smallest amplitude of a motion, rad (m)."""
 HELD = 2.0
-"""s, of which the second half is judged."""
+"""Duration of the rest, s; the second half is evaluated."""
 
 
 @dataclass(frozen=True)
 class Drive:
-    """The drive that will run it, and the motion that matters.
+    """The drive, and the motion to compensate for.
 
     Attributes
     ----------
     bandwidth, damping : float
-        Of the position loop's poles, Hz and -; the linear controller is placed with the model's inertia.
+        Of the position loop's poles, Hz and -; for pole placement with the model's inertia.
     sample_time : float
         s
     sample_time_from : str
-        Source of that resolution, for people; empty if it need not be reported.
+        Source of the sample time, for people; empty if it need not be reported.
     encoder_counts : float
         Per revolution (2 pi); 0 measures exactly.
     encoder_from : str
-        For people: where that is from; empty where nobody needs to be told.
+        Source of the counts, for people; empty if it need not be reported.
     torque_limit : float
         N·m
     amplitude : float or None
-        Of a slow sinusoid as the motion, rad; None: `motion`, or that of the log.
+        Of a slow sinusoid as motion, rad; None: `motion`, or that of the log.
     frequency : float
         Of that sinusoid, Hz.
     linear : str
         "PD", "PID" or "PR", placed by bandwidth and damping.
     gains : Gains, Cascade or None
-        Of the loop as it is; None: of the placement.
+        Gains of the existing loop; None: from pole placement.
     velocity_filter : float
-        Corner of the first-order low-pass on the velocity that the linear controller sees, Hz; 0 for none.
+        Corner of the first-order low-pass on the measured velocity, Hz; 0 for none.
     motion : Motion or None
         None: that of the log, or the sinusoid.
     controller : Controller or None
-        The loop as it is where it is made of control laws, without friction laws: gains, placement and filter are not
+        The existing loop if it consists of control laws, without friction laws; gains, placement and filter are not
         used then, and its sample time is the drive's.
     machine : Machine or None
-        The machine at hand, with its resonances, encoder, amplifier and delay; None: rigid axes.
+        The user's machine, with its resonances, encoder, amplifier and delay; None: rigid axes.
     delay : float or None
-        By which its commands act late, samples, where no machine says it; None: drawn, up to one sample.
+        Command delay, samples, without a machine; None: sampled, up to one sample.
     reference_velocity : {"difference", "instant"} or None
-        How it forms its reference velocity; None: not known. The best estimate then has the difference, and the drawn
-        axes have either.
+        How it forms its reference velocity; None: unknown. The best estimate then uses the difference, and the sampled
+        axes either.
     """
 
     bandwidth: float = 10.0
@@ -169,25 +172,25 @@ class Drive:
 
     @property
     def latest(self) -> float:
-        """Samples by which its commands act late, as far as it is known; 0 where it is not."""
+        """Command delay, samples, if known; else 0."""
         return self.machine.delay if self.machine is not None else self.delay or 0.0
 
     @property
     def steps(self) -> float:
-        """Steps of the simulations of one axis, about: the motion, the rest behind it, what is held at rest."""
+        """Approximate number of steps for one axis: the motion, the rest after it, and holding at rest."""
         return (self.course.whole.duration + HOLD + len(STARTS) * HELD) / min(5e-4, self.sample_time)
 
     def deadband(self, counts: float) -> float:
-        """The velocity of so many counts of the encoder per sample time, rad/s; 0 where it measures exactly."""
+        """Return the velocity of a number of encoder counts per sample time, rad/s; 0 for exact measurement."""
         return counts * 2.0 * math.pi / self.encoder_counts / self.sample_time if self.encoder_counts else 0.0
 
     @property
     def given(self) -> bool:
-        """Whether the loop is somebody's own, and not placed by bandwidth and damping."""
+        """Whether the loop is given by the user, not by pole placement."""
         return self.gains is not None or self.controller is not None
 
     def loop(self, inertia: float) -> Controller:
-        """The linear controller, or the one made of control laws, alone."""
+        """Return the linear controller, or the one made of control laws, alone."""
         if self.controller is not None:
             limit = min(self.torque_limit, self.controller.torque_limit)
             return replace(
@@ -202,45 +205,46 @@ class Drive:
 
     @cached_property
     def path(self) -> Motion:
-        """The motion that is judged: `motion`, or its part from rest to rest, or the sinusoid.
+        """The motion to evaluate: `motion`, or its part from rest to rest, or the sinusoid.
 
         Raises
         ------
         ParameterError
-            If there is neither.
+            If there is no motion.
         """
         return self.course.judged
 
     @cached_property
     def course(self) -> Course:
-        """The motion with what brings the axis up to speed before it and to rest behind it.
+        """The motion with a run-up before it and braking after it.
 
         Raises
         ------
         ParameterError
-            As of `path`.
+            As for `path`.
         """
         if self.motion is not None:
             return course_of(self.motion)
         if self.amplitude is None:
             raise ParameterError(
-                "drive: there is no motion to try a setting along; give a motion or an amplitude"
+                "drive: there is no motion for testing a setting; give a motion or an amplitude"
             )
         return course_of(sinusoid(self.amplitude, self.frequency))
 
     @cached_property
     def reference(self) -> Array:
-        """Position, velocity and acceleration of the motion at every sample, shape (n, 3), `HOLD` at rest behind it."""
+        """Position, velocity and acceleration of the motion at every sample, shape (n, 3), with `HOLD` at rest after
+        it."""
         return self.course.sampled(self.sample_time)
 
     @cached_property
     def reference_backward(self) -> Array:
-        """The same, its velocity the mean over the sample before."""
+        """The same, with the mean velocity over the previous sample."""
         return self.course.backward(self.reference, self.sample_time)
 
     @cached_property
     def stops(self) -> float:
-        """How often the motion stops or turns, 1/s."""
+        """Rate of stops and reversals of the motion, 1/s."""
         side = np.sign(np.diff(self.reference[:, 0]))
         return float(np.sum((side[:-1] != 0.0) & (side[1:] != side[:-1]))) / (side.size * self.sample_time)
 
@@ -264,7 +268,7 @@ class Drive:
 
 
 def refuse_other(machine: Machine, sample_time: float, counts: float) -> None:
-    """Refuse a drive that is not the machine's.
+    """Refuse a drive that contradicts the machine.
 
     Raises
     ------
@@ -281,7 +285,7 @@ def refuse_other(machine: Machine, sample_time: float, counts: float) -> None:
 
 
 def refuse_unfit(controller: Controller, sample_time: float) -> None:
-    """Refuse a loop made of control laws that the drive cannot be.
+    """Refuse a loop made of control laws that does not fit the drive.
 
     Raises
     ------
@@ -294,13 +298,13 @@ def refuse_unfit(controller: Controller, sample_time: float) -> None:
     for part, block in controller.blocks.items():
         if block.friction is not None:
             raise ParameterError(
-                f"drive: {part} = {block.law.name!r} holds a friction law, which is what is looked for; leave it out"
+                f"drive: {part} = {block.law.name!r} contains a friction law, which is to be recommended; leave it out"
             )
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One axis under one controller: along the motion, and at rest behind it.
+    """Simulation of one axis with one controller: along the motion, and at rest after it.
 
     Attributes
     ----------
@@ -312,7 +316,7 @@ class Trial:
     sample_time : float
         s
     learned : mapping
-        What a controller made of control laws has learned at the end (`stickslip.control.learned.plain`).
+        Parameters learned by a controller of control laws at the end (`stickslip.control.learned.plain`).
     """
 
     moving: dict[str, float]
@@ -322,24 +326,25 @@ class Trial:
     learned: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def restless(self, swing: float) -> tuple[float, float]:
-        """Swings per second by more than `swing`, rad: beyond those of the reference in all, and at rest behind it."""
+        """Swings per second by more than `swing`, rad: in total in addition to those of the reference, and at rest
+        after it."""
         beyond = turns(self.position, swing) - turns(self.reference, swing)
         resting = turns(self.late, swing) / (0.5 * HOLD)
         return beyond / (self.position.size * self.sample_time), resting
 
     @property
     def late(self) -> Array:
-        """The positions of the second half of the rest behind the motion, rad."""
+        """Positions in the second half of the rest after the motion, rad."""
         return self.position[-round(0.5 * HOLD / self.sample_time) :]
 
     def swing(self, drive: Drive) -> float:
-        """What a swing has at least to be one: counts, or a part of this trial's error, rad."""
+        """Smallest swing that counts, rad: some counts, or a share of this trial's error."""
         count = drive.deadband(1.0) * drive.sample_time
         return max(SWINGS[0] * count, SWINGS[1] * self.moving["position_rms_rad"])
 
 
 def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
-    """The motion and the rest behind it; the reason where it cannot be run to its end."""
+    """Simulate the motion and the rest after it; return the reason if it ends early."""
     backward = isinstance(plant, Plant) and plant.backward
     reference = drive.reference_backward if backward else drive.reference
     position, state = followed(plant, controller, reference)
@@ -359,10 +364,10 @@ def run(plant: RigidAxis, controller: Controller, drive: Drive) -> Trial | str:
 
 
 def rings(plant: RigidAxis, linear: Controller, drive: Drive, alone: Trial | str) -> str:
-    """Where the linear controller alone oscillates on an axis, "at rest" or "in motion"; empty where it is calm.
+    """Return "at rest" or "in motion" if the linear controller alone oscillates on an axis; empty if it is calm.
 
-    `alone` is its trial. Besides, it holds a position between two counts, from near it: whether it happens to stop
-    there after a way is luck, and a compensator that leaves less error brings it there.
+    `alone` is its trial. It is also tested at a position between two counts: whether a motion ends there is chance, and
+    a compensator with a smaller error leads there.
     """
     if isinstance(alone, str):
         return "at rest"
@@ -376,7 +381,7 @@ def rings(plant: RigidAxis, linear: Controller, drive: Drive, alone: Trial | str
 
 
 def held_between_counts(plant: RigidAxis, linear: Controller, drive: Drive) -> Iterator[Array | None]:
-    """Late positions of an axis that is held between two counts, from near there, rad; None where it diverges."""
+    """Return the late positions of an axis at rest between two counts, rad; None if it diverges."""
     count = drive.deadband(1.0) * drive.sample_time
     held = np.zeros((round(HELD / drive.sample_time), 3))
     held[:, 0] = 0.5 * count
@@ -386,9 +391,9 @@ def held_between_counts(plant: RigidAxis, linear: Controller, drive: Drive) -> I
 
 
 def dangers(before: Trial, after: Trial, drive: Drive, feedforward: bool = False) -> Iterator[str]:
-    """What a compensator makes worse than the linear controller alone.
+    """Return the properties in which a compensator is worse than the linear controller alone.
 
-    At rest a feedforward's torque is constant, so that what rings there is the linear controller alone.
+    At rest a feedforward's torque is constant, so only the linear controller can ring there.
     """
     swing = before.swing(drive)
     (was, rested), (now, resting) = before.restless(swing), after.restless(swing)

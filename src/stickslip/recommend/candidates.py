@@ -1,4 +1,4 @@
-"""Settings of a compensator on a bench of axes, judged against what the linear controller alone does there."""
+"""Test settings of a compensator on a bench of axes, compared with the linear controller alone."""
 
 from __future__ import annotations
 
@@ -27,41 +27,41 @@ from stickslip.recommend.swings import between_counts
 AFTER_A_PUSH = "limit cycle at rest after a push"
 
 WORTH = 0.95
-"""A compensator that leaves more than this part of the error is not worth its risk."""
+"""A compensator with more than this share of the error remaining is not worth its risk."""
 HARDLY = f"hardly less error (more than {100.0 * WORTH:g} % left)"
-"""Why a safe setting is not worth it."""
+"""Reason against a safe setting."""
 
 FOLLOWS, LIVELY = 3.0, 5.0
-"""An axis that the drive's own loop does not hold is not the user's: times the best estimate's error, and swings per
-second beyond the best estimate's, from which on it does not."""
+"""An axis that the drive's own loop does not hold cannot be the user's: multiples of the best estimate's error, and
+additional swings per second, above which it does not hold it."""
 NEAR = 1.1
-"""Errors within this factor of the best are alike; what is simpler, or has the lower gain, is then taken."""
+"""Errors within this factor of the best are equivalent; the simpler setting, or the lower gain, is then selected."""
 TRIES = 4
-"""Times as many axes are drawn at most, for so many that are held."""
+"""Largest number of drawn axes, relative to the number required."""
 LOOKED_AT = 16
-"""Axes on which the linear controller alone is judged: the best estimate and some drawn ones."""
+"""Number of axes for testing the linear controller alone: the best estimate and some sampled ones."""
 SLOWER = (0.7, 0.5, 0.35, 0.25, 0.1)
-"""Of the bandwidth: where a linear controller that rings alone is tried for one that is calm."""
+"""Lower bandwidths, relative to the drive's, that are tried for a linear controller that rings alone."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What is switched on: a law with its numbers.
+    """A setting: a law with its numbers.
 
     Attributes
     ----------
     law, kind : str
         ``kind`` is "feedforward" or "feedback".
     gain : float
-        0: no friction is compensated, but inertia and offset are fed forward.
+        0: no friction compensation, only feedforward of inertia and offset.
     lead : float
-        s, by which a feedforward looks ahead of the reference.
+        Lead of a feedforward, s.
     deadband : float
-        rad/s, velocities below which a feedback's law sees rest.
+        Velocity below which a feedback treats the axis as resting, rad/s.
     inertia_feedforward : float
-        kg·m², times the reference's acceleration: torque that is given too.
+        kg·m²; times the reference acceleration: additional torque.
     offset : float
-        N·m, constant torque that is given too.
+        Additional constant torque, N·m.
     """
 
     law: str
@@ -79,18 +79,18 @@ class Setting:
 
     @property
     def words(self) -> str:
-        """Return the setting in words."""
+        """Return the setting as text."""
         if not self.compensates:
             return "inertia feedforward alone, without friction compensation"
         return f"{self.kind} of law {self.law!r}, gain {self.gain:g}"
 
     @property
     def label(self) -> str:
-        """The law that compensates friction, or what is fed forward without one."""
+        """The law that compensates friction, or the name of the feedforward without one."""
         return self.law if self.compensates else "inertia alone"
 
     def on(self, linear: Controller, model: Model) -> Controller:
-        """The linear controller with this compensator."""
+        """Return the linear controller with this compensator."""
         if not linear.is_short:
             return self.beside(linear, model)
         compensator = COMPENSATORS[self.kind](
@@ -100,7 +100,7 @@ class Setting:
         return replace(linear, compensator=compensator)
 
     def beside(self, loop: Controller, model: Model) -> Controller:
-        """The loop made of control laws with this compensator's beside its own."""
+        """Return the loop of control laws with this compensator in addition to its own."""
         more: list[ControlBlock] = []
         if self.inertia_feedforward or self.offset:
             fed = {"inertia": self.inertia_feedforward, "offset": self.offset}
@@ -117,7 +117,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One setting and what it did on every axis.
+    """One setting and its results on every axis.
 
     Attributes
     ----------
@@ -126,14 +126,14 @@ class Candidate:
         RMS position error along the motion over that of the linear controller alone, one per axis; the best
         estimate first. The first axis on which it is not safe is the last.
     unsafe : tuple of str
-        Why it is not safe to switch on; empty where it is.
+        Reasons why it is unsafe; empty if it is safe.
     useless : str
-        Why it is not worth it where it is safe; empty where it is.
+        Reason why a safe setting is not worth it; empty if it is.
     refused_as : Setting or None
-        The setting with which it was refused at the confirmation, with its lead and the gain tried; None: it was not.
+        The setting, with its lead and gain, that failed the confirmation; None if none failed.
     finished : bool
-        Whether the verdict is final. False: the remaining axes were not simulated, since the candidate is beaten
-        whatever happens on them; it is neither safe nor unsafe then.
+        Whether the verdict is final. False: the remaining axes were not simulated, because the candidate cannot become
+        the best; it is then neither safe nor unsafe.
     """
 
     setting: Setting
@@ -145,18 +145,18 @@ class Candidate:
 
     @property
     def refused(self) -> tuple[str, ...]:
-        """Why it is not to be switched on; empty where it may be."""
+        """Reason for rejection; empty if it may be switched on."""
         return (*self.unsafe, *([self.useless] if self.useless else []))
 
     @property
     def worst(self) -> float:
-        """The greatest remaining part of the error; a lower bound of it while the candidate is not finished."""
+        """The largest remaining share of the error; a lower bound while the candidate is not finished."""
         return max(self.errors)
 
     @property
     def usual(self) -> float:
-        """The part of the error that remains at most on half of the axes; the best estimate counts where it is the only
-        one."""
+        """The median remaining share of the error over the sampled axes; that of the best estimate if it is the only
+        axis."""
         return median(self.errors[1:] or self.errors)
 
     def as_dict(self) -> dict[str, Any]:
@@ -166,7 +166,7 @@ class Candidate:
 
 
 class Account:
-    """How many axes are simulated, of how many at most; what is unsafe is left early, and the rest of it counted."""
+    """Progress in simulated axes, of the largest number; unsafe candidates end early and count as finished."""
 
     def __init__(self, progress: Callable[[int, int], None], settings: int, axes: int, more: int) -> None:
         self.progress, self.axes, self.done = progress, axes, 0
@@ -174,15 +174,15 @@ class Account:
         progress(0, self.total)
 
     def one(self) -> None:
-        """Another axis is simulated."""
+        """Count another simulated axis."""
         self._reach(self.done + 1)
 
     def tried(self, settings: int) -> None:
-        """So many settings have been judged on the first axes."""
+        """Count settings tested on the first axes."""
         self._reach(max(self.done, self.axes * settings))
 
     def end(self) -> None:
-        """Nothing is left."""
+        """Finish."""
         self._reach(self.total)
 
     def _reach(self, done: int) -> None:
@@ -206,11 +206,11 @@ class Moved(NamedTuple):
 
 
 class Bench:
-    """Axes, each with what the linear controller alone does on it, and the laws that may be switched on.
+    """Axes, each with the result of the linear controller alone, and the candidate laws.
 
-    `ran` is called after every axis that was simulated. `left_out` are axes that were drawn and not held; `rested` is
-    what the linear controller alone swings by at rest for long, once it is known; `longest_rest` is the longest rest
-    that was simulated, and `hunted_within` the longest in which an axis hunted, s.
+    `ran` is called after every simulated axis. `left_out` are sampled axes that the loop does not hold; `rested` is the
+    swing of the linear controller alone at long rest, once it is known; `longest_rest` is the longest rest that was
+    simulated, and `hunted_within` the longest in which an axis hunted, s.
     """
 
     def __init__(
@@ -231,7 +231,8 @@ class Bench:
         drawn: Iterator[RigidAxis], count: int, linear: Controller, drive: Drive, laws: Mapping[str, Model],
         ran: Callable[[], None] = lambda: None,
     ) -> Bench:  # fmt: skip
-        """The best estimate, which is drawn first, and the first `count` others that the linear controller holds."""
+        """Return the best estimate, which is drawn first, and the first `count` others that the linear controller
+        holds."""
         bench = Bench([next(drawn)], linear, drive, laws, ran)
         best, kept, alone = bench.before(0), list(bench.plants), list(bench.alone)
         for plant, trial in in_turn(lambda plant: (plant, run(plant, linear, drive)), drawn) if count else ():
@@ -247,7 +248,7 @@ class Bench:
         return bench
 
     def before(self, i: int) -> Trial | str:
-        """The linear controller alone on axis i."""
+        """Return the trial of the linear controller alone on axis i."""
         while len(self.alone) <= i:
             self.alone.append(run(self.plants[len(self.alone)], self.linear, self.drive))
             self.ran()
@@ -256,7 +257,7 @@ class Bench:
     def trials(
         self, controller: Controller, axes: Sequence[int] | None = None
     ) -> Iterator[tuple[Trial | str, Trial | str]]:
-        """Run the linear controller alone and this one on one axis after the other (None: on all), some ahead in
+        """Run the linear controller alone and this one on one axis after the other (None: on all), some in advance in
         parallel."""
 
         def both(i: int) -> tuple[Trial | str, Trial | str]:
@@ -273,16 +274,16 @@ class Bench:
             yield before, after
 
     def ringing(self) -> Iterator[tuple[RigidAxis, str]]:
-        """The axes, of the first `LOOKED_AT`, on which the linear controller alone oscillates, and where."""
+        """Return the axes, of the first `LOOKED_AT`, on which the linear controller alone oscillates, and when."""
         for i, plant in enumerate(self.plants[:LOOKED_AT]):
             if where := rings(plant, self.linear, self.drive, self.before(i)):
                 yield plant, where
 
     def judged(self, setting: Setting, most: float = math.inf) -> Candidate:
-        """Judge the setting on every axis, up to the first on which it is not safe.
+        """Test the setting on every axis, up to the first on which it is unsafe.
 
-        The candidate is left unfinished once more than `most` of the error is left on an axis. A later call goes on
-        from there: nothing is simulated twice.
+        The candidate stays unfinished once more than the share `most` of the error remains on an axis. A later call
+        continues from there: nothing is simulated twice.
         """
         errors: list[float] = []
         for i, (error, unsafe) in enumerate(self._along_motion(setting)):
@@ -295,12 +296,12 @@ class Bench:
         return Candidate(setting, tuple(errors), (), HARDLY if max(errors) > WORTH else "")
 
     def every(self, setting: Setting) -> Iterator[tuple[float, tuple[str, ...]]]:
-        """Yield the part of the error left, and the reasons why the setting is not safe, axis by axis."""
+        """Yield the remaining share of the error and the reasons why the setting is unsafe, axis by axis."""
         for i, (error, unsafe) in enumerate(self._along_motion(setting)):
             yield error, unsafe or self._after_a_push(setting, i)
 
     def error_on(self, i: int, setting: Setting) -> float:
-        """Return the part of the error that a setting leaves on axis i."""
+        """Return the remaining share of the error with a setting on axis i."""
         self.before(i)
         return next(self._along_motion(setting, [i])).error
 
@@ -323,7 +324,7 @@ class Bench:
         return Moved(error, tuple(dangers(before, after, self.drive, setting.kind == "feedforward")))
 
     def _after_a_push(self, setting: Setting, i: int) -> tuple[str, ...]:
-        """Return why a setting is not safe where axis i is pushed at rest; a feedforward does not react to a push."""
+        """Return why a setting is unsafe if axis i is pushed at rest; a feedforward does not react to a push."""
         if setting.kind != "feedback":
             return ()
         if (setting, i) not in self._swings_on:
@@ -332,7 +333,8 @@ class Bench:
         return (AFTER_A_PUSH,) if self._swings_on[setting, i] else ()
 
     def swings_on(self, i: int, controller: Controller) -> bool:
-        """Return whether after a push at rest axis i swings on under this controller, and not under the linear one."""
+        """Return whether axis i continues to swing after a push at rest with this controller, but not with the linear
+        one."""
         plant, before = self.plants[i], self.before(i)
         if not isinstance(before, Trial):
             return False
@@ -343,15 +345,14 @@ class Bench:
 
 
 def why_lost(before: Trial | str, after: Trial | str) -> str:
-    """Why an axis is not held, of the linear controller alone and with a compensator: what fails alone is not the
-    compensator's."""
+    """Return why an axis is not held, by the linear controller alone or only with a compensator."""
     if isinstance(before, str):
         return f"the linear controller alone fails ({before})"
     return after if isinstance(after, str) else ""
 
 
 def lost(trial: Trial | str, best: Trial | str, drive: Drive) -> bool:
-    """Whether a linear controller does not hold an axis, where it holds the best estimate."""
+    """Whether a linear controller that holds the best estimate does not hold an axis."""
     if isinstance(trial, str) or isinstance(best, str):
         return isinstance(trial, str) and not isinstance(best, str)
     swing = best.swing(drive)
@@ -361,20 +362,19 @@ def lost(trial: Trial | str, best: Trial | str, drive: Drive) -> bool:
 
 
 def on_both(setting: Setting, bench: Bench, others: Bench) -> Candidate:
-    """The setting on the bench; if it is safe there but not on the other axes, that is why it is not safe."""
+    """Test the setting on the bench and, if it is safe there, on the other axes."""
     here = bench.judged(setting)
     there = here if here.unsafe else others.judged(setting)
     return replace(here, unsafe=there.unsafe)
 
 
 def breakaway(model: Model) -> float:
-    """The torque that the contact withstands at rest, of both directions the greater, N·m; 0 where the law does not
-    tell it."""
+    """Return the larger break-away torque of both directions, N·m; 0 if the law does not define it."""
     return max(static_level(model), static_level(model, -1.0)) if model.law.steady else 0.0
 
 
 def resistance(model: Model, drive: Drive) -> float:
-    """The greatest friction along the motion, break-away among it, N·m; 0 where the law does not tell it."""
+    """Return the largest friction along the motion, including break-away, N·m; 0 if the law does not define it."""
     if not model.law.steady:
         return 0.0
     v = drive.path.top_speed * np.concatenate([np.linspace(0.0, 1.0, 200), -np.linspace(1e-9, 1.0, 200)])
@@ -382,7 +382,8 @@ def resistance(model: Model, drive: Drive) -> float:
 
 
 def rings_alone(bench: Bench, inertia: float, torque: str) -> str:
-    """Where the linear controller alone oscillates, by how much, why, and what to change; empty where it is calm."""
+    """Return where and how much the linear controller alone oscillates, the cause and the remedy; empty if it is
+    calm."""
     drive, gains, count = bench.drive, bench.linear.gains, len(bench.plants[:LOOKED_AT])
     push = bench.linear.linear.kd * drive.deadband(1.0) if gains is not None else 0.0
     ringing = list(_telling(bench, push))
@@ -391,30 +392,30 @@ def rings_alone(bench: Bench, inertia: float, torque: str) -> str:
     where = " and ".join(sorted({where for _, where, _ in ringing}))
     on = f"on {len(ringing)} of {count} axes" if count > 1 else "on the best estimate"
     if gains is None:
-        return f"{where} {on}; lower its gains, or take a finer encoder or a shorter sample time"
+        return f"{where} {on}; lower its gains, or use a finer encoder or a shorter sample time"
     swing, plants = max(swing for _, _, swing in ringing), [plant for plant, _, _ in ringing]
     size = (
         f" (at rest by up to {swing:.2g} {'m' if torque == 'N' else 'rad'} peak to peak)" if math.isfinite(swing)
         else " (it diverges)"
     )  # fmt: skip
-    # What swings wider than counts allow is at most set off by them: an exact encoder only delays it.
+    # Larger swings than by counts are at most triggered by them: an exact encoder only delays them.
     wide = integral_of(gains)[1] > 0.0 and swing > between_counts(drive.encoder_counts)
     counts = not wide and by_counts(plants, bench.linear, drive)
     if not counts and integral_of(gains)[1] > 0.0:
         return f"{where} {on}{hunting(gains, drive.given)}{size}"
     why = (
-        f": a count of the encoder makes it push {push:.2g} {torque} for a sample{size}"
+        f": one encoder count causes a torque pulse of {push:.2g} {torque} for one sample{size}"
         if counts and push
         else size
     )
-    finer = ", or take a finer encoder" if counts and push else ", or a shorter sample time"
+    finer = ", or use a finer encoder" if counts and push else ", or a shorter sample time"
     if drive.given:
         return f"{where} {on}{why}; lower the gain on the velocity ({velocity_gain(gains):.4g}){finer}"
     return f"{where} {on}{why}; {_calmer(bench, plants, inertia)}{finer}"
 
 
 def _telling(bench: Bench, push: float) -> Iterator[tuple[RigidAxis, str, float]]:
-    """The axes that oscillate, where, and peak to peak at rest, rad; not those that stay within an encoder's counts."""
+    """Return the axes that oscillate, when, and peak to peak at rest, rad; without those within encoder counts."""
     index = {id(plant): i for i, plant in enumerate(bench.plants)}
     for plant, where in bench.ringing():
         swing = swing_at_rest(plant, bench.linear, bench.drive, bench.before(index[id(plant)]))
@@ -423,7 +424,7 @@ def _telling(bench: Bench, push: float) -> Iterator[tuple[RigidAxis, str, float]
 
 
 def _calmer(bench: Bench, plants: Sequence[RigidAxis], inertia: float) -> str:
-    """At which bandwidth the axes do not oscillate."""
+    """Return the bandwidth at which the axes do not oscillate, as text."""
     drive = bench.drive
     for share in SLOWER:
         slower = replace(drive, bandwidth=share * drive.bandwidth)
@@ -434,5 +435,5 @@ def _calmer(bench: Bench, plants: Sequence[RigidAxis], inertia: float) -> str:
 
 
 def velocity_gain(gains: Gains | Cascade) -> float:
-    """On the measured velocity, N·m·s/rad."""
+    """Return the gain on the measured velocity, N·m·s/rad."""
     return gains.kvp if isinstance(gains, Cascade) else gains.kd

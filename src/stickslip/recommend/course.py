@@ -1,9 +1,8 @@
-"""The course of a trial: a motion from rest to rest, the part of it that is judged, and how it gets there and away.
+"""The motion of a trial, from rest to rest: the evaluated part, with run-up and braking.
 
-A log is longer than the part of it that is tried, and that part may begin or end in mid-move. A reference that stops
-dead saturates the loop, and the error of that stop would be most of what is judged. So the part is cut where it rests.
-Where it rests too seldom for that (a sine, a staircase), the axis is brought up to speed before it and braked behind
-it, smoothly and not judged. Where the reference jumps, no drive knows a velocity: its reference velocity is 0 there.
+Only a part of a log is simulated, which may start or end mid-move. A reference that stops abruptly saturates the loop,
+and the error of that stop would dominate. So the part is cut at rests. If it rests too rarely (a sine, a staircase), a
+smooth run-up and braking are added and not scored. At jumps of the reference its velocity is undefined and set to 0.
 """
 
 from __future__ import annotations
@@ -20,37 +19,37 @@ from stickslip.identify.motion import HOLD, REST, Motion
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 RESTING = 3
-"""Points of a motion, at least, in which a rest shows: where it turns there may be one or two."""
+"""Fewest points of a rest; a reversal may have one or two points at rest."""
 MOST_LOST = 0.5
-"""Of the way, that is left out at most so that a motion begins and ends at rest."""
+"""Largest share of the travel to leave out for a start and end at rest."""
 GENTLE, USUAL = 0.5, 0.98
-"""Part of this quantile of the motion's own acceleration, with which it is brought up to speed and braked."""
+"""Acceleration of run-up and braking, as a share of this quantile of the motion's own."""
 SHORTEST, LONGEST = 0.1, 1.0
-"""s, that bringing it up to speed, or braking it, takes."""
+"""Range of the duration of run-up and braking, s."""
 RAMP = 16
-"""Pieces of either."""
+"""Pieces of run-up and braking."""
 JUMP = 0.035
-"""s: a way from rest to rest in less is a jump. No position loop follows it."""
+"""s: a faster move from rest to rest is a jump, which no position loop can follow."""
 SUDDEN, SMALLEST = 20.0, 1e-3
-"""Times the speed before and behind it, and part of the motion's span, that a jump has at least."""
+"""Smallest jump, as a multiple of the speed before and after it, and as a share of the motion's span."""
 LEAP, ELSEWHERE = 5.0, 0.8
-"""Times this quantile of the motion's accelerations, that a jump would take."""
+"""Smallest acceleration of a jump, as a multiple of this quantile of the motion's accelerations."""
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What a setting is tried along.
+    """The motion for testing a setting.
 
     Attributes
     ----------
     judged : Motion
-        What is judged.
+        The evaluated part.
     whole : Motion
-        The same from rest to rest.
+        The same, from rest to rest.
     run_up, braking : float
-        s before and behind what is judged; 0 where it begins or ends at rest.
+        s before and after the evaluated part; 0 if it starts or ends at rest.
     jumps : tuple of (float, float)
-        Begin and end of each jump of the position, s from the begin of `whole`.
+        Start and end of each jump of the position, s from the start of `whole`.
     """
 
     judged: Motion
@@ -60,8 +59,8 @@ class Course:
     jumps: tuple[tuple[float, float], ...] = ()
 
     def sampled(self, sample_time: float) -> Array:
-        """Position, velocity and acceleration at every sample, shape (n, 3): from rest at 0, and `HOLD` at rest
-        behind it. The position jumps from one sample to the next."""
+        """Return position, velocity and acceleration at every sample, shape (n, 3): from rest at 0, with `HOLD` at rest
+        after it. Jumps of the position take one sample."""
         out = self.whole.sampled(sample_time)
         for begin, end in self._rows(sample_time):
             middle = (begin + end) // 2
@@ -70,7 +69,7 @@ class Course:
         return out
 
     def backward(self, reference: Array, sample_time: float) -> Array:
-        """The same, its velocity the mean over the sample before: 0 where the position jumps."""
+        """Return the same with the mean velocity over the previous sample: 0 where the position jumps."""
         out = reference.copy()
         out[:, 1] = np.diff(out[:, 0], prepend=out[0, 0]) / sample_time
         for begin, end in self._rows(sample_time):
@@ -78,14 +77,14 @@ class Course:
         return out
 
     def rows_judged(self, samples: int, sample_time: float) -> slice:
-        """The rows of `sampled` that are judged, of so many."""
+        """Return the evaluated rows of `sampled`."""
         return slice(
             round(self.run_up / sample_time),
             samples - round(HOLD / sample_time) - round(self.braking / sample_time),
         )
 
     def _rows(self, sample_time: float) -> list[tuple[int, int]]:
-        """The last sample before every jump, and the first one behind it."""
+        """Return the last sample before every jump and the first one after it."""
         return [
             (int(begin / sample_time), max(round(end / sample_time), int(begin / sample_time) + 1))
             for begin, end in self.jumps
@@ -93,30 +92,30 @@ class Course:
 
     @cached_property
     def highest_jump(self) -> float:
-        """rad; 0 where there is none."""
+        """Largest jump, rad; 0 without jumps."""
         t = self.whole.time - self.whole.time[0]
         at = (np.interp([begin, end], t, self.whole.position) for begin, end in self.jumps)
         return max((abs(float(end - begin)) for begin, end in at), default=0.0)
 
     @property
     def said(self) -> str:
-        """How it gets to speed and to rest, for people; empty where it begins and ends at rest."""
+        """Description of run-up and braking; empty if it starts and ends at rest."""
         if self.run_up and self.braking:
             how = (
-                f"begins and ends in motion: brought up to speed over {self.run_up:.2g} s before it and braked over "
-                f"{self.braking:.2g} s behind it"
+                f"starts and ends in motion: a run-up of {self.run_up:.2g} s and a braking of "
+                f"{self.braking:.2g} s are added"
             )
         elif self.run_up:
-            how = f"begins in motion: brought up to speed over {self.run_up:.2g} s before it"
+            how = f"starts in motion: a run-up of {self.run_up:.2g} s is added"
         elif self.braking:
-            how = f"ends in motion: braked over {self.braking:.2g} s behind it"
+            how = f"ends in motion: a braking of {self.braking:.2g} s is added"
         else:
             return ""
-        return f"{how}, which is not judged"
+        return f"{how} and not scored"
 
 
 def course_of(motion: Motion) -> Course:
-    """The course along a motion: its part from rest to rest, or all of it with a smooth begin and end."""
+    """Return the course of a motion: its part from rest to rest, or all of it with a smooth start and end."""
     jumping = [] if measured(motion) else list(jumps_of(motion))
     velocity, times = motion.velocity.copy(), motion.time
     for first, last in jumping:
@@ -136,23 +135,23 @@ def course_of(motion: Motion) -> Course:
 
 
 def measured(motion: Motion) -> bool:
-    """Whether it is what the axis did, and not what it was told: of a log that has no reference."""
+    """Whether it is the measured motion of a log without a reference."""
     return motion.source.startswith("position")
 
 
 def jumps_of(motion: Motion) -> Iterator[tuple[int, int]]:
-    """The last point before every jump of the position, and the first one behind it."""
+    """Return the last point before every jump of the position and the first one after it."""
     time, position = motion.time, motion.position
     speed = np.abs(np.diff(position) / np.diff(time))
     least = SMALLEST * float(np.ptp(position))
     bearable = LEAP * float(np.quantile(np.abs(np.diff(motion.velocity) / np.diff(time)), ELSEWHERE))
-    around = np.concatenate([[0.0], speed, [0.0]])  # It rests before and behind.
+    around = np.concatenate([[0.0], speed, [0.0]])  # It rests before and after.
     first = 0
     while first < speed.size:
         for last in range(first + 1, min(first + 3, speed.size) + 1):
             lasts = float(time[last] - time[first])
             quiet = SUDDEN * float(max(around[first], around[last + 1]))
-            # From rest to rest in a time takes four times the way over its square at least.
+            # A move from rest to rest requires at least four times the distance divided by the time squared.
             beyond = max(least, quiet * lasts, 0.25 * bearable * lasts**2)
             if speed[first] > quiet and lasts <= JUMP and abs(position[last] - position[first]) > beyond:
                 yield first, last
@@ -162,7 +161,7 @@ def jumps_of(motion: Motion) -> Iterator[tuple[int, int]]:
 
 
 def from_rest_to_rest(motion: Motion) -> Motion:
-    """Its part from rest to rest; at an end where that would leave out too much of the way, all of it."""
+    """Return its part from rest to rest; an end stays if that would leave out too much of the travel."""
     size, way = motion.time.size, _way(motion)
     first, last = 0, size - 1
     rests = [(begin + end) // 2 for begin, end in resting(motion)]
@@ -181,11 +180,11 @@ def from_rest_to_rest(motion: Motion) -> Motion:
     kept, begin = slice(first, last + 1), float(motion.time[0])
     span = " to ".join(f"{float(t) - begin:.3g}" for t in motion.time[[first, last]])
     own = (x[kept] for x in _points(motion))
-    return Motion(*own, source=f"{motion.source}; of it {span} s behind its begin, from rest to rest")
+    return Motion(*own, source=f"{motion.source}; from {span} s, rest to rest")
 
 
 def resting(motion: Motion) -> Iterator[tuple[int, int]]:
-    """First and last point of every rest."""
+    """Return the first and last point of every rest."""
     still = np.abs(motion.velocity) <= REST * motion.top_speed
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
     for first, behind in edges.reshape(-1, 2):
@@ -194,16 +193,16 @@ def resting(motion: Motion) -> Iterator[tuple[int, int]]:
 
 
 def run_up_to(motion: Motion) -> tuple[Array, Array, Array]:
-    """Times, positions and velocities of points that lead from rest into a motion; none where it begins at rest."""
+    """Return times, positions and velocities of the run-up to a motion; none if it starts at rest."""
     backwards = Motion(-motion.time[::-1], motion.position[::-1], -motion.velocity[::-1])
     time, position, velocity = braked_from(backwards)
     return -time[::-1], position[::-1], -velocity[::-1]
 
 
 def braked_from(motion: Motion) -> tuple[Array, Array, Array]:
-    """Times, positions and velocities of points that lead from a motion to rest; none where it ends at rest.
+    """Return times, positions and velocities of the braking after a motion; none if it ends at rest.
 
-    The velocity falls by a cubic that begins with the motion's last acceleration and ends with none.
+    The velocity is a cubic that starts with the motion's last acceleration and ends with zero.
     """
     if not _moves(motion, -1):
         return np.zeros(0), np.zeros(0), np.zeros(0)
@@ -212,7 +211,7 @@ def braked_from(motion: Motion) -> tuple[Array, Array, Array]:
     speed = float(motion.velocity[-1])
     longest = max(SHORTEST, min(LONGEST, 0.5 * motion.duration))
     duration = min(max(1.5 * abs(speed) / gentle, SHORTEST), longest) if gentle > 0.0 else longest
-    # Beyond three times the speed the cubic would go back before it rests.
+    # Beyond three times the speed the cubic would reverse before it rests.
     bend = float(np.clip(duration * float(np.mean(acceleration[-3:])), -3.0 * abs(speed), 3.0 * abs(speed)))
     u = np.linspace(0.0, 1.0, RAMP + 1)[1:]
     velocity = speed * (1.0 - 3.0 * u**2 + 2.0 * u**3) + bend * (u - 2.0 * u**2 + u**3)
@@ -221,7 +220,7 @@ def braked_from(motion: Motion) -> tuple[Array, Array, Array]:
 
 
 def _moves(motion: Motion, end: int) -> bool:
-    """Whether it moves at its begin (0) or end (-1)."""
+    """Whether it moves at its start (0) or end (-1)."""
     return abs(float(motion.velocity[end])) > REST * motion.top_speed
 
 
@@ -230,5 +229,5 @@ def _points(motion: Motion) -> tuple[Array, Array, Array]:
 
 
 def _way(motion: Motion) -> Array:
-    """How far it has gone at every point, rad."""
+    """Return the distance travelled at every point, rad."""
     return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(motion.position)))])

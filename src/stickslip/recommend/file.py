@@ -1,4 +1,4 @@
-"""recommended.toml of what `stickslip.recommend.recommend` found: the law to run with ``[recommended]``."""
+"""Write recommended.toml from the result of `stickslip.recommend.recommend`: the law, with ``[recommended]``."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from stickslip.recommend.recommend import Recommendation
 
 
 def write_setting(path: str | os.PathLike[str], found: Identified, advice: Recommendation) -> Path:
-    """Write what is recommended: the same form as that of `stickslip rig commission`, without a machine's name.
+    """Write the recommendation, in the form of `stickslip rig commission` without the name of a machine.
 
-    Beside a loop made of control laws, or with a compensator of the catalogue: the whole controller, as
-    `stickslip.control.files` reads it.
+    With a loop of control laws, or a compensator of the catalogue: the whole controller, as `stickslip.control.files`
+    reads it.
 
     Parameters
     ----------
     path : path
     found : Identified
-        What the advice was made for.
+        The model of the recommendation.
     advice : Recommendation
 
     Raises
@@ -39,13 +39,13 @@ def write_setting(path: str | os.PathLike[str], found: Identified, advice: Recom
     """
     target = Path(path)
     if advice.chosen is None and advice.instead is None:
-        raise InputError(f"no compensator is recommended, so that there is nothing to write to {target}")
+        raise InputError(f"no compensator is recommended, so there is nothing to write to {target}")
     result, law, more = _parts(found, advice)
     return write_model(target, result, data=found.data, law=law, more=more)
 
 
 def setting_table(found: Identified, advice: Recommendation) -> Table:
-    """What `write_setting` writes, as the table that reading it gives.
+    """Return the table that `write_setting` writes.
 
     Raises
     ------
@@ -53,13 +53,13 @@ def setting_table(found: Identified, advice: Recommendation) -> Table:
         If nothing is recommended.
     """
     if advice.chosen is None and advice.instead is None:
-        raise InputError("no compensator is recommended, so that there is nothing to export")
+        raise InputError("no compensator is recommended, so there is nothing to export")
     result, law, more = _parts(found, advice)
     return in_memory(model_content(result, found.data, os.path.realpath(law) if law else "", more))
 
 
 def _parts(found: Identified, advice: Recommendation) -> tuple[Identification, str, dict[str, Any]]:
-    """The law, the path of its file, and the further tables."""
+    """Return the law, the path of its file, and the further tables."""
     further = _further(advice)
     model = advice.model or found.model
     motion = ServoAxis(motion="linear") if found.motion == "linear" else ServoAxis()
@@ -73,7 +73,7 @@ def _parts(found: Identified, advice: Recommendation) -> tuple[Identification, s
 
 
 def _further(advice: Recommendation) -> dict[str, Any]:
-    """The controller, where it is made of control laws, or the setting beside the linear one."""
+    """Return the controller if it is made of control laws, else the setting with the linear one."""
     if advice.instead is not None:
         assert advice.instead.controller is not None
         return tables_of(advice.instead.controller)
@@ -86,7 +86,7 @@ def _further(advice: Recommendation) -> dict[str, Any]:
 
 
 def recommended_table(advice: Recommendation, machine: str = "") -> dict[str, Any]:
-    """``[recommended]``: the setting beside a linear controller, and the machine on which it was measured."""
+    """Return ``[recommended]``: the setting with a linear controller, and the machine on which it was measured."""
     assert advice.chosen is not None
     drive, setting = advice.drive, advice.chosen.setting
     loop = drive.loop(advice.inertia)

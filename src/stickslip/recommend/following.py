@@ -1,4 +1,4 @@
-"""An axis under a controller along a reference, sample by sample: the positions of the axis itself."""
+"""Simulate an axis with a controller along a reference, sample by sample: the positions of the axis itself."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from stickslip.spec import Surroundings
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 OPEN = [f.name for f in MEMORY].index("open")
-"""Place in a controller's memory: it takes over an axis without torque, as on a drive that is switched on."""
+"""Index in a controller's state: it takes over an axis without torque, as when a drive is switched on."""
 
 
 def simulated(
     plant: RigidAxis, controller: Controller, reference: Array, start: float = 0.0, push: Array | None = None
 ) -> Array | None:
-    """Positions of the axis itself at every sample along a reference, rad; None where it diverges.
+    """Return the positions of the axis at every sample along a reference, rad; None if it diverges.
 
-    The axis starts at rest at `start`, rad. `push` acts beside the controller's torque, N·m at every sample. The
-    reference has a row a sample: position, velocity, acceleration.
+    The axis starts at rest at `start`, rad. `push` is added to the controller's torque, N·m at every sample. The
+    reference has one row per sample: position, velocity, acceleration.
     """
     return followed(plant, controller, reference, start, push)[0]
 
@@ -39,7 +39,7 @@ def simulated(
 def followed(
     plant: RigidAxis, controller: Controller, reference: Array, start: float = 0.0, push: Array | None = None
 ) -> tuple[Array | None, Array]:
-    """As `simulated`, and the state in which it leaves the controller's laws."""
+    """As `simulated`, with the final state of the controller's laws."""
     control = compiled(controller)
     control.memory[OPEN] = 1.0
     laid = laid_out(plant, controller.sample_time, controller.encoder_counts)
@@ -53,7 +53,7 @@ def followed(
 
 @kernel()
 def follow(laid: Laid, control: Sampled, path: Any, push: Any, around: Any, positions: Any) -> int:
-    """Controller and machine, sample by sample; how many samples ran before one gave no torque."""
+    """Run controller and machine sample by sample; return the number of samples before one gave no torque."""
     plant, u = plant_of(laid), record_at(pointer(around, 0), AROUND)
     seen = np.zeros(len(CHANNELS))
     shown = record_at(pointer(seen, 0), SHOWN)

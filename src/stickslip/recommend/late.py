@@ -1,7 +1,7 @@
-"""A loop that is too fast for a drive whose commands act late: friction holds it up to where a push is larger.
+"""Refuse a loop that is too fast for the drive's command delay.
 
-Such a loop is unstable where the axis slides. Friction takes the energy out of small swings, so that a simulation along
-a slow motion may show none of it.
+Such a loop is unstable while the axis slides. Friction dissipates the energy of small swings, so a simulation along a
+slow motion may not show it, until a push is large enough.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from stickslip.recommend.plant import Plant
 from stickslip.recommend.sample_time import MIDDLE, WELL_DAMPED
 
 SLOWER = 0.9
-"""Bandwidths that are tried, each over the one before."""
+"""Ratio of successive bandwidths."""
 SLOWEST = 1e-3
-"""Part of the bandwidth, below which none is named."""
+"""Lowest bandwidth to name, relative to the drive's."""
 
 
 def sensitivity_of(found: Identified, drive: Drive, inertia: float, loop: Controller) -> float:
-    """Greatest sensitivity of the loop while the axis (inertia in kg·m²) slides; infinite where it is unstable, not a
-    number where the controller is not smooth."""
+    """Return the largest sensitivity of the loop while the axis (inertia in kg·m²) slides; infinite if it is unstable,
+    NaN if the controller is not smooth."""
     plant = Plant(inertia, found.model, machine=drive.machine).built(drive.sample_time, drive.encoder_counts)
     try:
         linear = linearised(loop, math.inf, MIDDLE, drive.latest)
@@ -39,7 +39,7 @@ def sensitivity_of(found: Identified, drive: Drive, inertia: float, loop: Contro
 
 
 def fastest(found: Identified, drive: Drive, inertia: float) -> float:
-    """The bandwidth below the drive's at which its loop is well damped, Hz; 0 where none is."""
+    """Return the bandwidth below the drive's at which its loop is well damped, Hz; 0 if there is none."""
     bandwidth = drive.bandwidth
     while (bandwidth := SLOWER * bandwidth) > SLOWEST * drive.bandwidth:
         slower = place_at(drive, bandwidth, inertia)
@@ -49,12 +49,12 @@ def fastest(found: Identified, drive: Drive, inertia: float) -> float:
 
 
 def place_at(drive: Drive, bandwidth: float, inertia: float) -> Controller:
-    """The drive's loop placed at another bandwidth, Hz."""
+    """Return the drive's loop placed at another bandwidth, Hz."""
     return replace(drive, bandwidth=bandwidth).loop(inertia)
 
 
 def refuse_late(found: Identified, drive: Drive, inertia: float) -> None:
-    """Refuse a loop that is unstable while the axis slides, for how late the drive is.
+    """Refuse a loop that is unstable while the axis slides, because of the drive's delay.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def refuse_late(found: Identified, drive: Drive, inertia: float) -> None:
 
 
 def seconds_meant(drive: Drive) -> Iterator[str]:
-    """That a delay is so short that it may be in s."""
+    """Return the note that a short delay may be in s."""
     if drive.delay and drive.delay < SHORT_DELAY:
         yield (
             f"The delay of {drive.delay:g} is in samples, so that commands act {drive.delay * drive.sample_time:.3g} s "
@@ -91,7 +91,7 @@ def seconds_meant(drive: Drive) -> Iterator[str]:
 
 
 def hardly_damped_where_late(found: Identified, drive: Drive, inertia: float) -> Iterator[str]:
-    """That a placed loop is hardly damped for how late the drive is, and which one would be well damped."""
+    """Return the note that a placed loop is poorly damped with the drive's delay, and a well-damped bandwidth."""
     if drive.latest == 0.0 or drive.given:
         return
     peak = sensitivity_of(found, drive, inertia, drive.loop(inertia))

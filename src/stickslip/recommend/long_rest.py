@@ -1,4 +1,4 @@
-"""What a loop does at rest for long: an integral may take seconds for one cycle, which a short rest does not show."""
+"""Test a loop at long rest: with an integral, one cycle may take seconds, which a short rest does not show."""
 
 from __future__ import annotations
 

@@ -13,11 +13,12 @@ from stickslip.recommend.course import measured
 from stickslip.recommend.separation import dependence
 
 APART = 1.5
-"""Ratio of both medians of the error left, from which on it matters on which side of a threshold the axis is."""
+"""Ratio of both medians of the remaining error above which an attribute is reported."""
 
 
 def on_motion(drive: Drive, angle: str) -> Iterator[str]:
-    """Where the motion is not the drive's reference, or no axis can follow it; `angle` is the unit of positions."""
+    """Return the notes on a motion that is not the drive's reference, or that no axis can follow; `angle` is the
+    unit."""
     course = drive.course
     if drive.motion is not None and measured(course.judged):
         yield (
@@ -34,7 +35,7 @@ def on_motion(drive: Drive, angle: str) -> Iterator[str]:
 
 
 def _at_jumps(drive: Drive) -> str:
-    """Return the reference velocity that is simulated at jumps of the position, in words."""
+    """Return the reference velocity that is simulated at jumps of the position, as text."""
     if drive.reference_velocity == "difference":
         return "The drive differentiates it: the jump of the reference velocity is simulated."
     return (
@@ -44,7 +45,7 @@ def _at_jumps(drive: Drive) -> str:
 
 
 def by_attribute(found: Identified, chosen: Candidate | None, plants: Sequence[RigidAxis]) -> Iterator[str]:
-    """On which sampled attribute the error left depends most, by the axes on which the setting was confirmed."""
+    """Return the sampled attribute on which the remaining error depends most, from the axes of the confirmation."""
     if chosen is None or len(chosen.errors) < len(plants):
         return
     most = dependence(found, plants[1:], chosen.errors[1 : len(plants)], APART)

@@ -1,9 +1,9 @@
-"""An axis on which a setting is tried, as the machine engine runs it: rigid, with motor and load behind
-a spring, or on the machine at hand.
+"""An axis for testing a setting, as the machine engine runs it: rigid, with an elastically coupled load, or on the
+user's machine.
 
-The machine at hand brings what was measured of it: its inertias and springs (resonances), encoder, amplifier, delay,
-cogging and ripple. Friction and the whole inertia are the drawn axis's: they are what was identified, bearings and
-direction included.
+The user's machine defines its inertias and springs (resonances), encoder, amplifier, delay, cogging and ripple.
+Friction and total inertia are those of the sampled axis, because these were identified, including bearings and
+direction.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from stickslip.simulation.train.layout import seat
 
 @dataclass(frozen=True)
 class Plant(RigidAxis):
-    """An axis with what acts beside its friction, and how late the drive's torque acts.
+    """An axis with further torques and the drive's delay.
 
     Attributes
     ----------
@@ -38,20 +38,20 @@ class Plant(RigidAxis):
     waves : tuple of (float, float, float)
         Torques over the position, amplitude cos(order x + phase): order (1/rad), amplitude (N·m), phase (rad).
     delay : float
-        Part of a sample by which the torque acts late, from 0 to 1.
+        Delay of the torque as a share of a sample, from 0 to 1.
     bandwidth : float
-        Of the current loop, Hz; infinite follows at once.
+        Of the current loop, Hz; infinite: no lag.
     backward : bool
-        Whether the drive's reference velocity is the mean over the sample before, half a sample late, as the velocity
-        that it measures; else that of the instant.
+        Whether the drive's reference velocity is the mean over the previous sample, delayed by half a sample like the
+        measured velocity; else that of the instant.
     flexible : TwoMassAxis or None
-        Motor and load behind a spring; None: a rigid axis.
+        Motor and load connected by a spring; None: a rigid axis.
     machine : Machine or None
-        The machine at hand, in place of ``delay``, ``bandwidth`` and ``flexible``.
+        The user's machine, in place of ``delay``, ``bandwidth`` and ``flexible``.
     sampled : mapping of str to float
-        Drawn values of the estimates, by name.
+        Sampled values of the estimates, by name.
     unmodelled : float
-        Drawn torque over the position, N·m RMS.
+        Sampled torque over the position, N·m RMS.
     """
 
     offset: float = 0.0
@@ -66,11 +66,11 @@ class Plant(RigidAxis):
 
     @cached_property
     def kept(self) -> dict[tuple[float, float], Laid]:
-        """How it was laid out, by the drive's sample time and counts: once for all controllers that are tried on it."""
+        """Cached layouts, by the drive's sample time and counts: once for all controllers."""
         return {}
 
     def built(self, sample_time: float, counts: float) -> Machine:
-        """The machine that it is, sampled every `sample_time` s, with an encoder of `counts` where none is at hand."""
+        """Return the machine, sampled every `sample_time` s, with an encoder of `counts` unless it has one."""
         if self.machine is None:
             return Machine(
                 "axis", self.inertia, Contact(self.friction), flexible=self.flexible,
@@ -89,27 +89,27 @@ class Plant(RigidAxis):
 
 @dataclass(frozen=True)
 class WholeMachine(Plant):
-    """A machine with its own friction and inertia, as it is."""
+    """A machine with its own friction and inertia."""
 
     @classmethod
     def of(cls, machine: Machine) -> WholeMachine:
-        """The plant that this machine is."""
+        """Return this machine as a plant."""
         return cls(machine.inertia, machine.friction, machine=machine)
 
     def built(self, sample_time: float, counts: float) -> Machine:
-        """The machine."""
+        """Return the machine."""
         assert self.machine is not None
         return self.machine
 
 
 def laid_out(plant: RigidAxis, sample_time: float, counts: float) -> Laid:
-    """A machine at rest that is this axis, as the machine engine takes it."""
+    """Return a machine at rest for this axis, in the form of the machine engine."""
     own = plant if isinstance(plant, Plant) else Plant(plant.inertia, plant.friction)
     drive = (sample_time, counts)
     if drive not in own.kept:
         own.kept[drive] = laid_anew(own, *drive)
     laid = own.kept[drive]
-    # A run changes all but its flows, which are most of it.
+    # A run changes everything except its flows, which are the largest part.
     arrays: dict[str, Any] = {name: x for name, x in laid._asdict().items() if isinstance(x, np.ndarray)}
     copies = {name: x.copy() for name, x in arrays.items()}
     seat(copies["train"], copies["parameters"])
@@ -117,7 +117,7 @@ def laid_out(plant: RigidAxis, sample_time: float, counts: float) -> Laid:
 
 
 def laid_anew(own: Plant, sample_time: float, counts: float) -> Laid:
-    """The same, for a plant that was not yet laid out for such a drive."""
+    """Return the same for a plant without a cached layout for such a drive."""
     beside = [(0.0, -own.offset, 0.0)] if own.offset != 0.0 else []
     beside += own.waves
     laid = lay_out_machine(own.built(sample_time, counts), located=not beside)

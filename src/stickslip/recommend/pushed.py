@@ -1,8 +1,8 @@
-"""A feedback that is pushed at rest: whether the motion dies away as under the linear controller alone.
+"""Push a feedback at rest: check whether the motion decays as with the linear controller alone.
 
-A compensator that follows the measured velocity may rest by itself and still have a limit cycle beside that rest. A
-drive's noise, a load that changes or a hand reaches it: the velocity filter, the delay and the law's own springs turn
-its torque later than the motion. So what rests is pushed off the place that it sticks at, too.
+A compensator that uses the measured velocity may rest and still have a limit cycle near that rest, which noise, a
+changing load or a hand can start: velocity filter, delay and the law's own springs reverse its torque later than the
+motion. Therefore a resting axis is also pushed out of the position at which it sticks.
 """
 
 from __future__ import annotations
@@ -24,20 +24,19 @@ from stickslip.recommend.swings import back_and_forth, repeats, turns
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 PUSHES = (0.8, 1.0, 1.5, 2.0)
-"""Of the torque that the contact withstands at rest."""
+"""Sizes of the pushes, relative to the break-away torque."""
 FINER = tuple(0.8 + 0.1 * step for step in range(15))
-"""The same for the linear controller alone: an integral hunts after some of them only, and so much is not a
-compensator's."""
+"""The same for the linear controller alone, whose integral may hunt after some of them."""
 MORE = 1.5
-"""Times the linear controller's largest swing: beyond that a compensator makes it worse."""
+"""Multiple of the linear controller's largest swing above which a compensator is worse."""
 PUSHED = 10e-3
-"""s, for which each acts at most."""
+"""Longest duration of a push, s."""
 BEFORE, AFTER, JUDGED = 0.2, 3.0, 2.0
-"""s at rest before a push, and behind it; of which the last are judged."""
+"""Rest before and after a push, and its evaluated last part, s."""
 
 
 def pushes(plant: RigidAxis, drive: Drive, shares: Sequence[float] = PUSHES) -> Iterator[Array]:
-    """Torques at every sample, N·m: each ends before it brings the axis to the motion's own top speed."""
+    """Return the torques at every sample, N·m: each ends before the axis reaches the motion's own top speed."""
     friction = plant.friction
     held = max(static_level(friction), static_level(friction, -1.0)) if friction.law.steady else 0.0
     time = drive.sample_time
@@ -54,8 +53,7 @@ def pushes(plant: RigidAxis, drive: Drive, shares: Sequence[float] = PUSHES) -> 
 def swings(
     plant: RigidAxis, controller: Controller, drive: Drive, least: float, shares: Sequence[float] = PUSHES
 ) -> Iterator[float]:
-    """What it swings by long after each push, rad; 0 where it does not go on by more than `least`, infinite where it
-    diverges."""
+    """Return the swing long after each push, rad; 0 if it is at most `least`, infinite if it diverges."""
 
     def after(push: Array) -> float:
         position = simulated(plant, controller, np.zeros((push.size, 3)), push=push)
@@ -69,7 +67,7 @@ def swings(
 
 
 class AfterPushes:
-    """Swings of the linear controller alone after pushes on one axis, simulated as far as they are needed."""
+    """Swings of the linear controller alone after pushes on one axis, simulated on demand."""
 
     def __init__(self, plant: RigidAxis, linear: Controller, drive: Drive, least: float) -> None:
         self._found, self._remaining = [0.0], swings(plant, linear, drive, least, FINER)
@@ -86,5 +84,5 @@ class AfterPushes:
 def swings_on(
     plant: RigidAxis, controller: Controller, drive: Drive, least: float, alone: AfterPushes
 ) -> bool:
-    """Return whether it swings on after a push, by more than `MORE` times as much as the linear controller alone."""
+    """Return whether it continues to swing after a push, by more than `MORE` times the linear controller's swing."""
     return any(not alone.reach(swing) for swing in swings(plant, controller, drive, least) if swing > 0.0)

@@ -1,4 +1,4 @@
-"""What a recommendation is asked for: inertia, motion, and the laws that may be switched on."""
+"""Input of a recommendation: inertia, motion, and candidate laws."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from stickslip.recommend.candidate_run import Drive
 
 
 def inertia_of(found: Identified, given: float | None) -> float:
-    """The inertia that was given, else the model's, kg·m².
+    """Return the given inertia, else the model's, kg·m².
 
     Raises
     ------
     InputError
-        If there is none, or it is not greater than 0 and finite.
+        If there is none, or it is not positive and finite.
     """
     j = given if given is not None else found.axis.get("inertia")
     unit = found.unit("kg·m²")
@@ -34,7 +34,7 @@ def inertia_of(found: Identified, given: float | None) -> float:
 
 
 def with_motion(found: Identified, drive: Drive) -> Drive:
-    """The drive with the motion of the record where it names none.
+    """Return the drive, with the motion of the record unless it has its own.
 
     Raises
     ------
@@ -54,9 +54,9 @@ def with_motion(found: Identified, drive: Drive) -> Drive:
 
 
 def cautious(found: Identified) -> Model:
-    """The law as it is fed forward: viscous friction that no record told at the lower end of its interval.
+    """Return the law for a feedforward: viscous friction that is not identified has the lower bound of its interval.
 
-    Too much of it pushes at every speed; too little leaves what the loop had to do anyway.
+    Too much of it pushes at every speed; too little only leaves more to the loop.
     """
     least = {
         e.name: max(e.lower, 0.0) for e in found.estimates if e.name.startswith("sigma2") and not e.identified
@@ -65,7 +65,7 @@ def cautious(found: Identified) -> Model:
 
 
 def laws_of(model: Model) -> dict[str, Model]:
-    """The law itself, and Coulomb with viscous friction through its sliding curve: what every drive can run."""
+    """Return the law itself, and Coulomb with viscous friction from its sliding curve, which every drive can run."""
     laws = {model.law.name: model}
     if model.law.name == "coulomb" or not model.law.steady:
         return laws

@@ -1,7 +1,7 @@
 """Reason why no compensator is recommended, with its numbers and the remedy.
 
-The candidate that comes closest decides: the best one that was refused when it was confirmed, else the one that passes
-most axes. It is run on every sampled axis, and the attribute that separates the refused axes is named.
+The closest candidate determines it: the best one that failed the confirmation, else the one that passes most axes. It
+is run on every sampled axis, and the attribute that separates the failed axes is named.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ NARROWER = "identify a record that narrows the intervals of the model (measure_n
 def closest(candidates: Sequence[Candidate]) -> Candidate | None:
     """Return the candidate that comes closest to a recommendation; None if none was tried.
 
-    Those that were refused at the confirmation come first, then those that are good on the best estimate, then those
-    that pass most axes, then those with the least error.
+    First those that failed the confirmation, then those that pass on the best estimate, then those that pass most axes,
+    then those with the smallest error.
     """
     return min(
         candidates,
@@ -62,7 +62,7 @@ def why_refused(found: Identified, candidates: Sequence[Candidate], bench: Bench
         return f"the closest candidate ({name}) is refused on the best estimate already: {_on_one(best)}"
     plants, errors, unsafe = on_every_axis(setting, bench, others)
     bad = [_bad(e, u) for e, u in zip(errors, unsafe, strict=True)]
-    if not any(bad):  # Refused for another reason: the long rest after the motion.
+    if not any(bad):  # It failed for another reason: the long rest after the motion.
         said = best.refused[0]
         return f"the closest candidate ({name}) {said}; {remedy_of(said)}"
     kinds = [word for u in unsafe for word in u]

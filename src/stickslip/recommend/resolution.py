@@ -27,7 +27,7 @@ def encoder_for(
     machine : Machine, optional
         Machine that is simulated.
     controller : float
-        Counts that the controller of the user's file or object has; 0: none.
+        Counts in the user's controller; 0: none.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def encoder_for(
 
 
 def resolution_words(counts: float, linear: bool) -> str:
-    """Return the resolution in words."""
+    """Return the resolution as text."""
     if not counts:
         return "exact positions"
     return f"an encoder of {counts:.10g} counts per {'2π m' if linear else 'revolution'}"

@@ -1,6 +1,6 @@
-"""What a linear controller's own oscillation comes from: an encoder's counts, or the loop itself.
+"""Find the cause of a linear controller's own oscillation: the encoder's quantisation, or the loop itself.
 
-Asked by simulating the same axis with an encoder that measures exactly: what goes on there is not the counts'.
+The same axis is simulated with an exact encoder: an oscillation that remains is not caused by quantisation.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from stickslip.recommend.candidate_run import Drive, Trial, held_between_counts,
 from stickslip.recommend.swings import between_counts
 
 ASKED = 3
-"""Axes that are simulated with an exact encoder."""
+"""Number of axes that are simulated with an exact encoder."""
 QUIET = 0.2
-"""Of the friction at rest: a torque for a count below it moves nothing and is no noise to speak of."""
+"""Share of the friction at rest: a smaller torque per count moves nothing and is inaudible."""
 
 
 def swing_at_rest(plant: RigidAxis, linear: Controller, drive: Drive, alone: Trial | str) -> float:
-    """Peak to peak of the axis where it is held at rest, rad; infinite where it diverges."""
+    """Return the peak-to-peak motion of the axis at rest, rad; infinite if it diverges."""
     if isinstance(alone, str):
         return np.inf
     found = held_between_counts(plant, linear, drive)
@@ -34,34 +34,34 @@ def swing_at_rest(plant: RigidAxis, linear: Controller, drive: Drive, alone: Tri
 
 
 def within_counts(swing: float, push: float, friction: float, drive: Drive) -> bool:
-    """Whether an oscillation at rest is no more than what no loop avoids, by a torque that nobody hears."""
+    """Whether an oscillation at rest is within the unavoidable encoder counts, with an inaudible torque."""
     return swing <= between_counts(drive.encoder_counts) and push < QUIET * friction
 
 
 def by_counts(plants: Sequence[RigidAxis], linear: Controller, drive: Drive) -> bool:
-    """Whether the counts make most of these axes oscillate: measured exactly, they are calm."""
+    """Whether quantisation causes the oscillation of most of these axes: measured exactly, they are calm."""
     if not drive.encoder_counts:
         return False
     if drive.machine is not None:
-        return True  # Its encoder is its own; what is known is the torque for a count.
+        return True  # The machine has its own encoder; only the torque per count is known.
     exact, asked = replace(linear, encoder_counts=0.0), plants[:ASKED]
     calm = [not rings(plant, exact, drive, run(plant, exact, drive)) for plant in asked]
     return 2 * sum(calm) > len(asked)
 
 
 def integral_of(gains: Gains | Cascade) -> tuple[str, float]:
-    """Name and value of the integral gain; 0 where there is none."""
+    """Return name and value of the integral gain; 0 without one."""
     return ("kvi", gains.kvi) if isinstance(gains, Cascade) else ("ki", gains.ki)
 
 
 def hunting(gains: Gains | Cascade, given: bool) -> str:
-    """Cause and remedy of an integral part that hunts against friction, where an encoder might be thought to."""
+    """Return cause and remedy of an integral that hunts against friction, in contrast to quantisation."""
     why = "not of the encoder's counts alone, so that a finer one does not end it"
     return f": {why}; {against_friction(gains, given)}"
 
 
 def against_friction(gains: Gains | Cascade, given: bool) -> str:
-    """Cause and remedy of an integral part that hunts against friction."""
+    """Return cause and remedy of an integral that hunts against friction."""
     name, value = integral_of(gains)
     less = (
         f"lower {name} ({value:.4g})" if given else f"take a loop without it ({name_option('linear', 'PD')})"

@@ -1,7 +1,7 @@
-"""How often a drive's loop is sampled, where nobody says it: as often as its record has rows, unless it cannot be.
+"""Sample time of the drive's loop if it is not given: that of the record, unless this is impossible.
 
-A record may keep fewer rows than the loop takes samples. A loop that somebody runs is well damped; one that would not
-be, were it sampled only once a row, is sampled more often.
+A record may have fewer rows than the loop has samples. A loop in use is well damped; if it would not be with the sample
+time of the record, it is sampled faster.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from stickslip.messages import Note, name_option
 from stickslip.recommend.candidate_run import Drive
 
 WELL_DAMPED = 2.0
-"""Greatest sensitivity of loops as people set them: 1.2 to 2 (Åström and Hägglund, Advanced PID Control, 2006)."""
+"""Largest sensitivity of usual loops: 1.2 to 2 (Åström and Hägglund, Advanced PID Control, 2006)."""
 MIDDLE = 10.0
 """Hz; a linear loop is the same at every frequency."""
 
@@ -35,7 +35,7 @@ def sample_time_for(
     found: Identified, given: float | None, machine: Machine | None, sampled: Callable[[float], Drive],
     inertia: float | None = None,
 ) -> tuple[float, str]:  # fmt: skip
-    """The sample time of the drive, s, and where it is from: given, the machine's, the record's, or `USUAL_TIME`.
+    """Return the sample time of the drive, s, and its source: given, the machine's, the record's, or `USUAL_TIME`.
 
     Parameters
     ----------
@@ -43,11 +43,11 @@ def sample_time_for(
     given : float, optional
         s
     machine : Machine, optional
-        At hand.
+        The user's machine.
     sampled : callable
-        The drive with a sample time, s.
+        Returns the drive with a sample time, s.
     inertia : float, optional
-        kg·m², which tells whether the loop can have the record's sample time.
+        kg·m², for checking whether the loop can have the record's sample time.
     """
     if given is not None:
         return given, "as given"
@@ -57,7 +57,7 @@ def sample_time_for(
     if not period:
         return USUAL_TIME, f"assumed, as the model does not contain its record's; {OWN}"
     record = f"the record {file}" if file else "the identified record"
-    # Gains do not depend on it, and a bandwidth that is too high for it is no error yet.
+    # Gains do not depend on it, and a bandwidth that is too high for it is not an error yet.
     corner = sampled(USUAL_TIME).velocity_filter if period > USUAL_TIME else 0.0
     if not below_half_the_rate(corner, period):
         return USUAL_TIME, (
@@ -73,12 +73,12 @@ def sample_time_for(
 
 
 def below_half_the_rate(corner: float, period: float) -> bool:
-    """Whether a low-pass of this corner, Hz, filters anything at a sample time, s; 0: there is none."""
+    """Whether a low-pass of this corner, Hz, is possible at a sample time, s; 0: no filter."""
     return corner < 0.5 / period
 
 
 def refuse_filter(drive: Drive) -> None:
-    """Refuse a filter of the loop that lies above what its samples hold.
+    """Refuse a filter of the loop above half the sample rate.
 
     Raises
     ------
@@ -94,9 +94,9 @@ def refuse_filter(drive: Drive) -> None:
 
 
 def hardly_damped(loop: Controller, period: float, inertia: float) -> bool:
-    """Whether a loop on a rigid axis of this inertia, kg·m², would not be well damped at a sample time, s.
+    """Whether a loop on a rigid axis of this inertia, kg·m², would be poorly damped at a sample time, s.
 
-    A controller that is not smooth about rest has no linear loop, and its sample time is not doubted.
+    A controller that is not smooth about rest has no linear loop, so its sample time is accepted.
     """
     try:
         linear = linearised(replace(loop, sample_time=period), math.inf, MIDDLE)

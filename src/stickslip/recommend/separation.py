@@ -1,7 +1,7 @@
 """The sampled attribute that best separates the axes on which a setting is refused from those on which it is safe.
 
-Every sampled axis has attributes: the drawn values of the estimates (friction, inertia, offset), and what the drive and
-the machine may be (delay, current loop, reference velocity, torque over the position). For every attribute the distance
+Every sampled axis has attributes: the sampled values of the estimates (friction, inertia, offset), and properties of
+drive and machine (delay, current loop, reference velocity, torque over the position). For every attribute the distance
 between its distributions on both groups of axes is computed (Kolmogorov and Smirnov); it is the best that one
 threshold can do. The largest distance names the attribute, if chance alone does not explain it.
 """
@@ -35,7 +35,7 @@ class Attribute:
     Attributes
     ----------
     name, unit : str
-        In words; the unit is that of the axis.
+        As text; the unit is that of the axis.
     remedy : str
         Action that the user can take.
     """
@@ -69,7 +69,7 @@ class Separation:
     axes: tuple[int, int]
 
     def side(self, above: bool) -> str:
-        """Return the axes on one side of the threshold, in words."""
+        """Return the axes on one side of the threshold, as text."""
         a = self.attribute
         if a.name == REFERENCE_VELOCITY:
             return f"whose drive forms its reference velocity {self._formed(above)}"
@@ -78,7 +78,7 @@ class Separation:
 
     @property
     def remedy(self) -> str:
-        """Return what the user can do."""
+        """Return the remedy for the user."""
         if self.attribute.name != REFERENCE_VELOCITY:
             return self.attribute.remedy
         good = "instant" if self.above else "difference"
@@ -88,7 +88,7 @@ class Separation:
         )
 
     def _formed(self, difference: bool) -> str:
-        """Return how a drive forms its reference velocity, in words."""
+        """Return how a drive forms its reference velocity, as text."""
         return (
             "as the difference of two reference positions" if difference else "at the instant of the sample"
         )
@@ -161,7 +161,7 @@ def separate(found: Identified, plants: Sequence[RigidAxis], refused: Sequence[b
     best = max(found_by, key=lambda name: found_by[name][0])
     distance, bound, above = found_by[best]
     chance = 2.0 * math.exp(-2.0 * distance**2 * n * m / (n + m))
-    if distance == 1.0:  # exact: one threshold separates few axes often by chance
+    if distance == 1.0:  # exact: with few axes one threshold often separates them by chance
         chance = min(chance, 2.0 / math.comb(n + m, n))
     if len(columns) * chance > LEVEL:
         return None
@@ -173,7 +173,8 @@ def separate(found: Identified, plants: Sequence[RigidAxis], refused: Sequence[b
 
 
 def _best_threshold(x: Any, bad: Any) -> tuple[float, float, bool]:
-    """Largest distance of both distribution functions, its threshold, and whether the bad ones are above it."""
+    """Return the largest distance of both distribution functions, its threshold, and whether the failed ones are above
+    it."""
     places = np.unique(x)
     low, high = places[:-1], places[1:]
     below = x[None, :] <= low[:, None]
@@ -186,7 +187,8 @@ def _best_threshold(x: Any, bad: Any) -> tuple[float, float, bool]:
 def dependence(
     found: Identified, plants: Sequence[RigidAxis], errors: Sequence[float], factor: float
 ) -> tuple[Separation, float, float] | None:
-    """Return the attribute on which the error left depends most, with the median errors on its worse and better side.
+    """Return the attribute on which the remaining error depends most, with the median errors on its worse and better
+    side.
 
     None if the ratio of both medians is at most `factor`.
 
@@ -196,7 +198,7 @@ def dependence(
     plants : sequence of RigidAxis
         Sampled axes.
     errors : sequence of float
-        Error left on each.
+        Remaining error on each.
     factor : float
     """
     if not errors:

@@ -19,7 +19,7 @@ def draw(result: StudyResult) -> list[Figure]:
     Parameters
     ----------
     result : StudyResult
-        What was not run is left out.
+        Runs that are missing are left out.
 
     Returns
     -------

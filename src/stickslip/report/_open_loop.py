@@ -1,4 +1,4 @@
-"""Figures of a study besides its grid: friction over velocity in open loop, and comparisons of controllers."""
+"""Further figures of a study: friction over velocity in open loop, and comparisons of controllers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from stickslip.study.open_loop import Drive, Response
 from stickslip.study.plan import Study, load
 from stickslip.study.result import StudyResult
 
-NEAR_ZERO = 0.04  # rad/s, what the thesis shows where it compares laws
+NEAR_ZERO = 0.04  # rad/s, the range shown in the thesis for comparing laws
 GRID = 20_000  # instants of a response
 PLANT = {
     "nominal": Style("#000000", "-", 2.2),
@@ -31,11 +31,11 @@ PLANT = {
     "minus10": Style("#0072B2", (0, (2, 1)), 1.2),
 }
 UNITS = {"position": "rad", "velocity": "rad/s"}
-WINDOWS = {"3.18": 1.0, "3.19": 0.5}  # periods of the reference that the thesis shows
+WINDOWS = {"3.18": 1.0, "3.19": 0.5}  # periods of the reference shown in the thesis
 
 
 def planned(result: StudyResult) -> Study | None:
-    """The study as its file describes it, read from the copies of its inputs."""
+    """Return the study of a folder, read from the copies of its inputs."""
     inputs = result.manifest.get("inputs", [])
     if not inputs:
         return None
@@ -44,7 +44,7 @@ def planned(result: StudyResult) -> Study | None:
 
 
 def response_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
-    """Friction over velocity of laws that follow the same motion (thesis figures 3.5, 3.10 to 3.14, 3.20).
+    """Draw friction over velocity of laws for the same motion (thesis figures 3.5, 3.10 to 3.14, 3.20).
 
     The slip rules agree here: a prescribed motion does not reverse within the few milliseconds in which they
     differ.
@@ -68,7 +68,7 @@ def response_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
 
 
 def _loop(model: Model, response: Response, known: dict[str, tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Velocity (rad/s) and torque (N·m) in the second half of the response, after the first loading."""
+    """Return velocity (rad/s) and torque (N·m) in the second half of the response, after the first loading."""
     key = f"{model!r} {response.motion!r} {response.duration}"
     if key not in known:
         record = respond(
@@ -81,12 +81,12 @@ def _loop(model: Model, response: Response, known: dict[str, tuple[Array, Array]
 
 def _loop_curve(name: str, x: Array, y: Array, near: bool, plant: str, count: int) -> Curve:
     if near:
-        # Only the part that is shown, so that the file keeps its detail; gaps separate the passes.
+        # Only the visible part, which keeps the detail in the file; gaps separate the passes.
         outside = np.abs(x) > 1.3 * NEAR_ZERO
         keep = ~(outside & np.roll(outside, 1))
         x, y = np.where(outside, np.nan, x)[keep], y[keep]
     else:
-        # Away from zero velocity a loop is smooth: keep what moved by a dot's width.
+        # Away from zero velocity a loop is smooth: keep points that move by the width of a dot.
         dots = np.cumsum(np.hypot(np.diff(x, prepend=x[0]) / np.ptp(x), np.diff(y, prepend=y[0]) / np.ptp(y)))
         keep = np.append(np.diff(np.floor(dots * 800.0)) > 0, True)
         x, y = x[keep], y[keep]
@@ -98,12 +98,12 @@ def _loop_curve(name: str, x: Array, y: Array, near: bool, plant: str, count: in
 
 
 def law_style(name: str) -> Style:
-    """A law beside the plant: in its colour, dashed, so that the plant's line shows below."""
+    """Return the style of a law drawn over the plant: its colour, dashed, because the plant's line is below."""
     return replace(style_of(name), dashes=(0, (4, 1.2)), width=1.4, mark="")
 
 
 def _gap(loops: dict[str, tuple[Array, Array]], near: bool, first: str, called: Mapping[str, str]) -> str:
-    """Largest difference from the loop named first, over what is shown; `called`: the legend's names."""
+    """Return the largest difference from the first loop, in the visible part; `called`: names of the legend."""
     (_, (x, torque)), *others = loops.items()
     shown = np.abs(x) <= NEAR_ZERO if near else np.ones(x.size, np.bool_)
     gaps = {name: float(np.max(np.abs(y - torque)[shown])) for name, (_, y) in others}
@@ -119,7 +119,7 @@ def _gap(loops: dict[str, tuple[Array, Array]], near: bool, first: str, called: 
 
 
 def drive_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
-    """Positions of axes under the same motor torque (thesis figure 3.12)."""
+    """Draw positions of axes with the same motor torque (thesis figure 3.12)."""
     study = planned(view.result) if view.result.config.get("drives") else None
     for drive in study.drives if study else ():
         records = {name: _driven(axis, drive) for name, axis in drive.axes.items()}
@@ -139,13 +139,14 @@ def drive_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
         draw(stem, title, f"Largest position: {peaks}", [panel], 2.7)
         caption = (
             f"Open loop under {drive.amplitude:g} N·m at {drive.frequency:g} Hz. Largest position: {peaks}. Gross "
-            "sliding rules the record; the pre-sliding stiffness shows only near the turning points."
+            "sliding dominates the record; the presliding stiffness is visible only near the turning points."
         )
         yield Figure(stem.name.removeprefix("figure-"), drive.figure, title, caption, COMMON, stem)
 
 
 def _driven(axis: RigidAxis, drive: Drive) -> Record:
-    """The axis under T_m = amplitude sin(2 pi f t): a controller that passes the reference's velocity on as torque."""
+    """Simulate the axis with T_m = amplitude sin(2 pi f t), by a controller that outputs the reference velocity as
+    torque."""
     w = 2.0 * np.pi * drive.frequency
     torque = Reference(
         "harmonic", amplitude=drive.amplitude / w, frequency=drive.frequency, phase=-0.5 * np.pi
@@ -157,7 +158,7 @@ def _driven(axis: RigidAxis, drive: Drive) -> Record:
 
 
 def comparison_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
-    """Position and velocity errors of the controllers of every comparison (thesis figures 3.18, 3.19)."""
+    """Draw position and velocity errors of the controllers of every comparison (thesis figures 3.18, 3.19)."""
     for name, table in view.result.config.get("comparisons", {}).items():
         numbers = iter(table.get("figures", []))
         for reference in table.get("references", []):
@@ -177,7 +178,7 @@ def _comparison(
         records = {c: view.record(rule, case) for c, case in cases.items()}
         rms = {c: view.metric(rule, case, "position_rms_rad") for c, case in cases.items()}
     except KeyError:
-        return None  # A part of the study was run, or a run failed; the report lists those.
+        return None  # Only a part of the study was run, or a run failed; the report lists these.
     reference, friction, _ = next(iter(cases.values())).split("/")
     period = 1.0 / view.result.config["references"][reference].get("frequency", np.inf)
     end = period * WINDOWS[number] if number in WINDOWS and period else None
@@ -203,6 +204,6 @@ def _comparison(
 
 
 def _error(record: Record, word: str, end: float) -> tuple[Array, Array]:
-    """Time and error of position or velocity up to a time."""
+    """Return times and errors of position or velocity up to a time."""
     shown = record.time <= end
     return record.time[shown], (record[f"{word}_reference"] - record[word])[shown]

@@ -1,4 +1,4 @@
-"""The report's table of metrics: one for each reference and friction, the slip rules one below the other."""
+"""Tables of metrics for the report: one for each reference and friction, with the slip rules one below the other."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stickslip.study.result import Run
 
 @dataclass(frozen=True)
 class Column:
-    """A metric as it is shown.
+    """A metric in the table.
 
     Attributes
     ----------
@@ -21,8 +21,8 @@ class Column:
     factor : float
         From the metric's unit into `unit`.
     best : str
-        "all": the least of all is the best; "following": the least of the runs that follow, since an axis that
-        stays behind is smooth for nothing; "resting": the least of the runs that do not go on moving at steady
+        "all": the smallest of all is marked as best; "following": the smallest of the runs that follow the reference,
+        because an axis that stays behind is smooth but useless; "resting": the smallest of the runs that rest at steady
         state; empty: none is marked.
     """
 
@@ -37,7 +37,7 @@ COLUMNS = (
     Column("position_rms_rad", "RMS error", "mrad", 1e3),
     Column("position_peak_rad", "peak error", "mrad", 1e3),
     Column("second_half_position_rms_rad", "RMS error, second half", "mrad", 1e3),
-    # A mean: a limit cycle around the target has none.
+    # A mean, which is small for a limit cycle around the target.
     Column("steady_state_error_rad", "steady-state error (mean)", "mrad", 1e3, ""),
     Column("settling_s", "settling", "s", 1.0, "resting"),
     Column("velocity_rms_rad_s", "velocity error RMS", "mrad/s", 1e3),
@@ -50,12 +50,12 @@ COLUMNS = (
 )
 PERIODIC = ("second_half_position_rms_rad", "steady_state_error_rad", "settling_s")
 AT_REST = ("standstills", "longest_standstill_s")
-"""Columns that say nothing along a motion without end, and along one that comes to rest."""
+"""Columns that do not apply to a periodic motion, and to one that comes to rest."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Text of a table's cell, its CSS classes and how many columns it spans."""
+    """Text of a cell, its CSS classes and the number of columns that it spans."""
 
     text: str
     classes: str = ""
@@ -64,7 +64,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """A controller and its cells under one slip rule."""
+    """A controller and its cells for one slip rule."""
 
     controller: str
     rule: str
@@ -82,7 +82,7 @@ class MetricsTable:
 
 
 def metrics_tables(view: StudyView) -> list[MetricsTable]:
-    """One table for each reference and friction that was run."""
+    """Return a table for each reference and friction that was run."""
     tables: list[MetricsTable] = []
     for reference in view.references:
         idle = AT_REST if view.reference_kind(reference) == "step" else PERIODIC
@@ -109,7 +109,7 @@ def _finite(run: Run, metric: str) -> bool:
 
 
 def _cells(controller: str, group: Sequence[Run], columns: Sequence[Column]) -> list[Cell]:
-    """The cells of a controller in a group of runs."""
+    """Return the cells of a controller in a group of runs."""
     run = next((r for r in group if r.controller == controller), None)
     if run is None:
         return [Cell("not run", "soft", len(columns))]
@@ -119,7 +119,7 @@ def _cells(controller: str, group: Sequence[Run], columns: Sequence[Column]) -> 
 
 
 def _best(group: Sequence[Run], column: Column) -> list[Run]:
-    """The runs with the least magnitude of a metric."""
+    """Return the runs with the smallest magnitude of a metric."""
     worst = max((r.metrics.get("position_rms_rad", 0.0) for r in group), default=0.0)
     runs = [r for r in group if not r.failure and _finite(r, column.metric) and _eligible(r, column, worst)]
     least = min((abs(r.metrics[column.metric]) for r in runs), default=math.nan)

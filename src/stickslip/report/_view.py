@@ -1,4 +1,4 @@
-"""A study's runs as the report and the claims ask for them."""
+"""Access to a study's runs for the report and the claims."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from stickslip.thesis.edition import EDITIONS, PLAIN
 
 
 class StudyView:
-    """Runs by key, names in the study's order, what the configuration says of a controller."""
+    """Runs by key, names in the study's order, and the configuration of a controller."""
 
     def __init__(self, result: StudyResult) -> None:
         self.result = result
@@ -24,36 +24,36 @@ class StudyView:
         self._compensations = {run.controller: run.compensation for run in self.runs.values()}
 
     def metric(self, rule: str, case: str, name: str) -> float:
-        """One metric of a run; KeyError where it is missing or failed."""
+        """Return one metric of a run; KeyError if it is missing or failed."""
         run = self.runs[f"{rule}/{case}"]
         if run.failure or name not in run.metrics:
             raise KeyError(f"{run.key} ({run.failure or 'no ' + name})")
         return run.metrics[name]
 
     def record(self, rule: str, case: str) -> Record:
-        """The record of a run; KeyError where it is missing or failed."""
+        """Return the record of a run; KeyError if it is missing or failed."""
         run = self.runs[f"{rule}/{case}"]
         if run.failure:
             raise KeyError(f"{run.key} ({run.failure})")
         return run.record()
 
     def group(self, rule: str, reference: str, friction: str) -> list[Run]:
-        """The runs of one reference and friction, in the study's order."""
+        """Return the runs of one reference and friction, in the study's order."""
         keys = (f"{rule}/{reference}/{friction}/{c}" for c in self.controllers)
         return [self.runs[key] for key in keys if key in self.runs]
 
     def compensation(self, controller: str) -> str:
-        """`feedforward`, `feedback`, or the empty string for a linear controller alone."""
+        """Return `feedforward`, `feedback`, or the empty string for a linear controller alone."""
         return self._compensations.get(controller, "")
 
     def reference_kind(self, reference: str) -> str:
-        """The kind of a reference, `sine`; the empty string where the configuration does not say."""
+        """Return the kind of a reference, such as `sine`; the empty string if unknown."""
         return str(self._setting("references", reference).get("kind", ""))
 
     def _setting(self, family: str, name: str) -> Mapping[str, Any]:
         return self.result.config.get(family, {}).get(name, {})
 
     def kinds(self) -> Sequence[str]:
-        """The ways to compensate that the study has, feedforward first."""
+        """Return the structures of compensation in the study, feedforward first."""
         found = {self.compensation(c) for c in self.controllers}
         return [kind for kind in ("feedforward", "feedback") if kind in found]

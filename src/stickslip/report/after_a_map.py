@@ -1,4 +1,4 @@
-"""What comes after a torque over the angle: its export, or the axis where none shows."""
+"""Next step after a map of the torque over the angle: its export, or identification of the axis if there is none."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from stickslip.identify.estimate import Identification
 
 
 def after_a_map(found: Identification, model_file: str | Path) -> tuple[str, str, str]:
-    """What to do, and the line to copy in a shell and in Python."""
+    """Return the next step, with the line to copy in a shell and in Python."""
     waves = any(e.identified for e in found.estimates if e.name.partition("[")[0] in ("even", "odd"))
     if not waves and found.details["map"].form != "table":
         return (

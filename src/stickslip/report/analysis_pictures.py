@@ -1,4 +1,4 @@
-"""Pictures of the analyses: each takes an analysis's result and gives a title, a message and panels."""
+"""Pictures of the analyses: each function converts a result to a title, a message and panels."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ DASHED = (
 )  # fmt: skip
 LINES = (MAIN, OTHER, *DASHED[1:])
 SHOWN = 50.0
-"""ms of a response to a sudden velocity."""
+"""Duration of a response to a sudden velocity, ms."""
 SHARES = np.linspace(0.02, 0.98, 97)
 SPLITS = {"the rest at the motor": 0.001, "the rest in the middle": 0.999}
 
@@ -47,7 +47,7 @@ def draw_analysis(picture: Drawn, path: Path) -> None:
 
 
 def picture_of_spectra(found: Sequence[Spectrum]) -> Drawn:
-    """Densities, one panel a record, with the modes as lines across."""
+    """Return the spectral densities, one panel per record, with the modes as vertical lines."""
     panels = [_density(one) for one in found]
     first = found[0].peaks[0] if found[0].peaks else None
     where = f"strongest peak at {first.frequency:.0f} Hz" if first else "no peak stands out"
@@ -75,7 +75,7 @@ def _marks(count: int) -> list[Style]:
 
 
 def picture_of_repeatability(found: Sequence[Repeated]) -> Drawn:
-    """Every controller's runs over time, with their range and mean."""
+    """Return every controller's runs over time, with range and mean."""
     worst = max(found, key=lambda one: one.relative)
     message = f"the runs of {worst.name} differ most: {100 * worst.relative:.2g} % of the amplitude RMS"
     return "Repeated runs", message, [p for one in found for p in (_runs(one), _spread(one))], 1.6
@@ -109,7 +109,7 @@ def _thin(x: Array, y: Array, most: int = 760) -> tuple[Array, Array]:
 
 
 def picture_of_dependence(found: Dependence) -> Drawn:
-    """Torque over the angle, one line a pass."""
+    """Return the torque over the angle, one line per pass."""
     angle = np.degrees(found.angle)
     curves = [
         Curve(angle, p.torque, f"{p.name}, {p.time:.0f} s", LINES[i % len(LINES)])
@@ -130,14 +130,14 @@ def picture_of_dependence(found: Dependence) -> Drawn:
 
 
 def _means(found: Dependence) -> Iterator[Curve]:
-    """Mean torque of every pass over time, each direction for itself."""
+    """Return the mean torque of every pass over time, separately for each direction."""
     for forth, word, style, kind in ((True, "forth", MAIN, "points"), (False, "back", OTHER, "open points")):
         some = [p for p in found.passes if (p.velocity > 0.0) == forth]
         yield Curve(np.array([p.time for p in some]), np.array([p.mean for p in some]), word, style, kind)
 
 
 def picture_of_sides(found: Sides) -> Drawn:
-    """Both torques over the velocity, and their difference with its fit."""
+    """Return both torques over velocity, and their difference with its fit."""
     v = np.array([p.velocity for p in found.points])
     order = np.argsort(v)
     motor = np.array([p.motor for p in found.points])[order]
@@ -150,15 +150,19 @@ def picture_of_sides(found: Sides) -> Drawn:
         "torque (N·m)", "velocity (rad/s)",
     )  # fmt: skip
     below = Panel(
-        [Curve(v, motor - sensor, "motor less sensor", BOUND, "points"), Curve(span, fit, "Coulomb and viscous", MAIN)],
+        [
+            Curve(v, motor - sensor, "motor minus sensor", BOUND, "points"),
+            Curve(span, fit, "Coulomb and viscous", MAIN),
+        ],
         "difference (N·m)", "velocity (rad/s)",
     )  # fmt: skip
     message = f"between them {found.coulomb:.3g} N·m sign(v) + {found.viscous:.3g} N·m·s/rad v"
-    return "Motor side and sensor side", message, (top, below), 1.8
+    return "Motor and sensor torque", message, (top, below), 1.8
 
 
 def picture_of_overshoot(found: OvershootRule) -> Drawn:
-    """Responses of GMS to a sudden velocity for several C (thesis figures 4.14, 4.38), and the overshoot over C."""
+    """Return responses of GMS to a sudden velocity for several C (thesis figures 4.14, 4.38), and the overshoot over
+    C."""
     drawn: dict[float, str] = dict.fromkeys(found.values[:: found.values.size // 2].tolist(), "")
     drawn[float(found.model.parameters.c)] = "of the model"
     if found.c is not None:
@@ -181,11 +185,11 @@ def picture_of_overshoot(found: OvershootRule) -> Drawn:
 
 
 def picture_of_flexibility(found: Flexibility) -> Drawn:
-    """First mode over the share of the last inertia: however the rest is divided, none goes below the bound."""
+    """Return the first mode over the share of the last inertia: with no division of the rest it is below the bound."""
     curves: list[Curve] = []
     if len(found.stiffness) == 2:
         for i, (label, part) in enumerate(SPLITS.items()):
-            # Of what the last inertia leaves, `part` is the middle one's.
+            # `part` is the middle inertia's share of the rest.
             f = [
                 Chain(((1 - s) * (1 - part) * found.inertia, (1 - s) * part * found.inertia, s * found.inertia),
                       found.stiffness).modes().frequencies[1]
@@ -204,7 +208,7 @@ def picture_of_flexibility(found: Flexibility) -> Drawn:
     )  # fmt: skip
     curves += [
         Curve(
-            ends, np.full(2, f), f"stated first mode, {f:.0f} Hz", Style(DASHED[0].colour, BOUND.dashes, 1.4)
+            ends, np.full(2, f), f"claimed first mode, {f:.0f} Hz", Style(DASHED[0].colour, BOUND.dashes, 1.4)
         )
         for f in found.claimed[:1]
     ]

@@ -1,4 +1,4 @@
-"""What the report of an axis sets beside the fit: friction as measured, the slow motion close up, and what noise is."""
+"""Evidence next to the fit in the report of an axis: measured friction, slow motion in detail, and noise."""
 
 from __future__ import annotations
 
@@ -22,38 +22,37 @@ from stickslip.simulation.recorded_input.simulation import Mechanics
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BINS, FEWEST = 24, 8
-"""Of speed, over three decades; samples that one needs."""
+"""Bins of speed over three decades, and fewest samples of a bin."""
 ACCELERATING, STEADY = 0.3, 0.1
-"""Parts of friction: the torque that accelerates, and the middle half of a bin, beyond which a point tells nothing."""
+"""Shares of friction: largest acceleration torque, and largest interquartile range of a bin, for a valid point."""
 WINDOW, STEPS, SLOWER = 15, 12, 0.3
-"""Part of a record that is shown close up is one over it; steps of the encoder that it moves there at least, and what
-part of the usual way at most."""
+"""Divisor of the record for the detail; fewest encoder steps in it, and largest share of the usual travel."""
 GOOD_CODE = "good"
 """Code of a judgement that a misfit is explained by noise."""
 GOOD = 3.0
-"""Times the noise, up to which a misfit is called good."""
+"""Multiple of the noise up to which a misfit is called good."""
 
 
 # ---- friction as measured -----------------------------------------------------------------------------------------
 
 
 def measured_friction(inverse: InverseDynamics, mechanics: Mechanics | None) -> list[tuple[Array, Array]]:
-    """Speeds and friction torques of the record itself, for motion in the positive and the negative direction.
+    """Return speeds and friction torques of the record itself, for positive and negative direction.
 
-    The torque less what accelerates and what acts from outside, medians over bins of speed. Only where the axis hardly
-    accelerates, and where the torque is steady: at reversals, and where it sticks and slips, friction is no function of
-    the speed.
+    These are medians over bins of speed of the torque minus acceleration and external torques. Only rows with little
+    acceleration and a steady torque are used: at reversals and during stick-slip, friction is not a function of the
+    speed.
 
     Parameters
     ----------
     inverse : InverseDynamics
     mechanics : Mechanics or None
-        With the inertia and offset that were found at last; those of the inverse dynamics where None.
+        With the final inertia and offset; None: those of the inverse dynamics.
 
     Returns
     -------
     list of (array, array)
-        rad/s (m/s) and N·m (N), both positive; empty where there are none.
+        rad/s (m/s) and N·m (N), both positive; may be empty.
     """
     values = dict(zip(inverse.names, inverse.values.tolist(), strict=True))
     if mechanics is not None:
@@ -87,8 +86,8 @@ def measured_friction(inverse: InverseDynamics, mechanics: Mechanics | None) -> 
 
 
 def slow_rows(experiment: Experiment) -> slice | None:
-    """Rows of a fifteenth of a record in which the axis moves least, but some steps of its encoder and a thousandth of
-    its way; None where it moves as much everywhere, or the record is short."""
+    """Return the rows of the fifteenth of a record with the least motion, but at least some encoder steps and a
+    thousandth of its travel; None if the motion is uniform or the record short."""
     length = experiment.time.size // WINDOW
     if length < 100:
         return None
@@ -132,13 +131,13 @@ def judgements(found: Identification) -> dict[str, str]:
             drifts = f"the recorded torque alone lets it drift ({name_option('loop')} holds it)"
             out["position_relative"] = render(f"{told}: {drifts}")
         if inverse is not None:
-            # Its filters round every reversal: even the true axis leaves some per cent.
+            # Its filters smooth every reversal: even the true axis has a residual of some percent.
             out["inverse_dynamics_relative"] = "a first look, from which the search starts"
     return {k: v for k, v in out.items() if v}
 
 
 def beside(rms: float, level: float, what: str) -> str:
-    """A misfit over a noise, in words; empty where there is no noise to compare it with."""
+    """Return a misfit relative to noise as text; empty without noise."""
     if not (rms >= 0.0 and level > 1e-6 * rms):
         return ""
     times = rms / level
@@ -146,10 +145,10 @@ def beside(rms: float, level: float, what: str) -> str:
 
 
 def has_encoder(experiments: Sequence[Experiment]) -> bool:
-    """Whether every position moves in steps."""
+    """Whether every position is quantised."""
     return all(encoder_step(t.position) > 0.0 for t in experiments)
 
 
 def levels(each: Sequence[float]) -> float:
-    """The level of several records together: root mean square."""
+    """Return the root mean square level of several records together."""
     return math.sqrt(math.fsum(x * x for x in each) / len(each))

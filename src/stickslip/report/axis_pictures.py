@@ -1,4 +1,4 @@
-"""Pictures of an axis: the records, their simulation beside them, residuals, and the sliding curve with its band."""
+"""Pictures of an axis: records and their simulation, residuals, and the friction curve with its band."""
 
 from __future__ import annotations
 
@@ -25,29 +25,29 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BINS, FEWEST = 60, 5
 FAR = 20.0
-"""Times the motion, that its first position is away from 0."""
+"""Multiple of the motion by which its first position may differ from 0."""
 SHOWN = 4
-"""Records that are drawn one by one; the residuals hold all of them."""
+"""Number of records that are drawn separately; the residuals contain all."""
 
 
 def data_pictures(records: Sequence[Record], names: Sequence[str]) -> tuple[Picture, ...]:
-    """Position and drive signal of the first records over time."""
+    """Draw position and drive signal of the first records over time."""
     out: list[Picture] = []
     for place, record in enumerate(records[:SHOWN]):
         seconds = float(record.time[-1] - record.time[0])
-        # A clock that has run for long tells nothing.
+        # The value of a clock that has run for long is meaningless.
         late = abs(record.time[0]) > seconds
         time = record.time - (record.time[0] if late else 0.0)
         for channel in ("position", "torque", "motor_torque", "current", "voltage"):
             if channel not in record.channels or not np.any(np.isfinite(record[channel])):
                 continue
             values, words = record[channel], channel.replace("_", " ")
-            # A small motion far out is shown from where it begins.
+            # A small motion far from 0 is shown relative to its start.
             far = channel == "position" and abs(values[0]) > FAR * np.ptp(values)
             if far:
                 values, words = values - values[0], "position from the first"
             traces = [over_time("measured", time, values)]
-            # A reference that never changes belongs to an open loop.
+            # A constant reference belongs to an open loop.
             if (
                 channel == "position"
                 and not far
@@ -66,7 +66,7 @@ def data_pictures(records: Sequence[Record], names: Sequence[str]) -> tuple[Pict
 
 
 def over_time(label: str, time: Array, signal: Array) -> Trace:
-    """A signal thinned to what a picture can show."""
+    """Return a signal thinned to the resolution of a picture."""
     good = np.isfinite(signal)
     x, y = envelope(time[good], signal[good])
     return Trace(label, x, y)
@@ -75,9 +75,9 @@ def over_time(label: str, time: Array, signal: Array) -> Trace:
 def pictures_of(
     found: Identification, speeds: Mapping[str, Sequence[float]] | None = None
 ) -> tuple[Picture, ...]:
-    """The method's own pictures, and what the report adds for a whole axis and for a law with intervals.
+    """Return the method's own pictures, and those for a whole axis and for a law with intervals.
 
-    `speeds` are tenths of the recorded ones in either direction, marked beside the curve.
+    `speeds` are deciles of the recorded ones in each direction, marked at the curve.
     """
     output, inverse = found.details.get("output"), found.details.get("inverse")
     out = list(found.pictures)
@@ -94,13 +94,13 @@ def pictures_of(
 
 
 def tells(found: Identification, output: FittedAxis, sliding: Sliding | None) -> bool:
-    """Whether the simulation's position says how good the model is: driven by the recorded torque alone it drifts."""
+    """Whether the simulated position shows the quality of the model: driven by the recorded torque alone it drifts."""
     minimised = "prediction" not in found.details and not (sliding is not None and sliding.certain)
     return minimised or all(t.closed_loop for t in output.problem.experiments)
 
 
 def torque_pictures(found: Identification, sliding: Sliding) -> list[Picture]:
-    """Torque, measured and of the model, over time and velocity, and what it leaves."""
+    """Draw measured and model torque over time and velocity, and the residual."""
     motion = motion_of(found)
     unit, angle, speed = ("N", "m", "m/s") if motion == "linear" else ("N·m", "rad", "rad/s")
     curve = over_velocity(sliding, found, motion)
@@ -115,12 +115,12 @@ def torque_pictures(found: Identification, sliding: Sliding) -> list[Picture]:
 
 
 def motion_of(found: Identification) -> str:
-    """Rotary or linear."""
+    """Return "rotary" or "linear"."""
     return str(getattr(found.details.get("axis"), "motion", "rotary"))
 
 
 def fastest(output: Any, inverse: Any) -> float:
-    """The greatest speed that the records reached, rad/s."""
+    """Return the largest speed of the records, rad/s."""
     if isinstance(inverse, InverseDynamics):
         return float(np.max(np.abs(inverse.velocity)))
     runs = output.problem.simulated(output.u)
@@ -131,7 +131,7 @@ def fastest(output: Any, inverse: Any) -> float:
 
 
 def fits(output: FittedAxis) -> list[Picture]:
-    """Measured and simulated signals of the first records over time."""
+    """Draw measured and simulated signals of the first records over time."""
     out: list[Picture] = []
     problem = output.problem
     runs = problem.simulated(output.u) or []
@@ -149,7 +149,8 @@ def fits(output: FittedAxis) -> list[Picture]:
 
 
 def close_up(output: FittedAxis, runs: Sequence[Array]) -> list[Picture]:
-    """The slow motion of the first record: in pictures of all of it, friction's part is a line's width."""
+    """Draw the slow motion of the first record, because in a picture of the whole record friction is only a line's
+    width."""
     out: list[Picture] = []
     problem = output.problem
     experiment = problem.experiments[0]
@@ -170,7 +171,7 @@ def close_up(output: FittedAxis, runs: Sequence[Array]) -> list[Picture]:
 
 
 def output_residuals(output: FittedAxis) -> list[Picture]:
-    """Residuals of every signal over position, velocity and time."""
+    """Draw residuals of every signal over position, velocity and time."""
     problem = output.problem
     runs = problem.simulated(output.u) or []
     position = np.concatenate([t.position[t.rows] for t in problem.experiments])
@@ -196,7 +197,7 @@ def output_residuals(output: FittedAxis) -> list[Picture]:
 def residuals(
     signal: str, label: str, rest: Array, position: Array, velocity: Array, time: Array, angle: str, speed: str
 ) -> list[Picture]:  # fmt: skip
-    """Mean and the middle 90 % of a residual in bins of position, velocity and time."""
+    """Draw the mean and the central 90 % of a residual in bins of position, velocity and time."""
     rms, unit = float(np.sqrt(np.mean(rest**2))), label.rpartition(" (")[2].rstrip(")")
     out: list[Picture] = []
     for name, x, x_label in (
@@ -206,7 +207,8 @@ def residuals(
         centre, low, mean, high = binned(x, rest)
         if centre.size < 2:
             continue
-        # What a trend over x explains of the residual: where it is large the model lacks a dependence on x.
+        # Share of the residual's variance that a trend over x explains: if it is large, the model lacks a dependence on
+        # x.
         share = float(np.var(np.interp(x, centre, mean)) / max(np.var(rest), 1e-300))
         word = f"a mean over {name} explains {100.0 * min(share, 1.0):.0f} % of its variance"
         traces = (
@@ -221,7 +223,7 @@ def residuals(
 
 
 def binned(x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
-    """Centres of equal bins of x that hold enough samples, and there the 5 %, mean and 95 % of y."""
+    """Return centres of equal bins of x with enough samples, and their 5 %, mean and 95 % of y."""
     good = np.isfinite(x) & np.isfinite(y)
     x, y = x[good], y[good]
     if x.size == 0 or np.ptp(x) == 0.0:
@@ -245,7 +247,7 @@ def curve_picture(
     found: Identification, top: float, sliding: Sliding | None = None,
     speeds: Mapping[str, Sequence[float]] | None = None,
 ) -> Picture | None:  # fmt: skip
-    """The law at constant velocity with its 95 % band, measured friction, and where speeds were recorded."""
+    """Draw the law at constant velocity with its 95 % band, measured friction, and marks of the recorded speeds."""
     assert found.model is not None
     if not (math.isfinite(top) and top > 0.0):
         return None
@@ -262,7 +264,7 @@ def curve_picture(
     for side, curve in zip((1.0, -1.0), best[:1] if same else best, strict=False):
         word = "" if same else f", v {'>' if side > 0.0 else '<'} 0"
         drawn = side * curve_band(found.model, own, known, side * grid)
-        # Of parameters that the data hardly hold, no law may be left at some speed.
+        # With poorly determined parameters, no valid law may remain at some speed.
         if np.all(np.any(np.isfinite(drawn), axis=0)):
             banded = True
             low, high = np.nanpercentile(drawn, [2.5, 97.5], axis=0)
@@ -275,7 +277,7 @@ def curve_picture(
     message = f"Not identified: {unsure}." if unsure else "Every parameter of the law is identified."
     return Picture(
         "sliding-curve", f"Friction at constant velocity: {found.model.law.title or found.model.law.name}",
-        f"{message}{' The band holds 95 % of the laws that the data allow.' if banded else ''}"
+        f"{message}{' The band contains 95 % of the laws that are consistent with the data.' if banded else ''}"
         f"{' Points: as measured.' if points else ''}", f"velocity ({unit('rad/s')})",
         f"friction torque ({unit('N·m')})",
         tuple(traces), "log",
@@ -283,7 +285,7 @@ def curve_picture(
 
 
 def marks(speeds: Mapping[str, Sequence[float]], low: float, high: float) -> list[Trace]:
-    """Fiftieths of the recorded speeds, where the curve is drawn; tenths are given, and what lies between is even."""
+    """Return 50 quantiles of the recorded speeds for the curve, interpolated from the deciles."""
     if not speeds:
         return []
     x = np.concatenate(
@@ -294,7 +296,7 @@ def marks(speeds: Mapping[str, Sequence[float]], low: float, high: float) -> lis
 
 
 def points_of(found: Identification, sliding: Sliding | None = None) -> list[Trace]:
-    """Friction as the records show it, beside the curve; none where it depends on more than the speed."""
+    """Return measured friction points for the curve; none if it depends on more than the speed."""
     inverse, mechanics = found.details.get("inverse"), found.details.get("mechanics")
     if not isinstance(inverse, InverseDynamics) or (
         isinstance(mechanics, Mechanics) and mechanics.load_motor > 0.0

@@ -1,4 +1,4 @@
-"""The report of a bench of compensators: decision table, a picture and a table per machine."""
+"""Write the report of a bench of compensators: decision table, a picture and a table per machine."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from stickslip.study.bench_decision import CONDITIONS, LATE, USUAL, Choice, Stan
 from stickslip.whole_files import write_whole
 
 WIDTH, LEFT, ROW, TOP = 760.0, 190.0, 15.0, 46.0
-"""Of a picture, px: width, room for names, height of a row, room for the title."""
+"""Layout of a picture, px: width, space for names, height of a row, space for the title."""
 CALM, OTHER, BAR = "#1f5f99", "#999999", "#c9d8e6"
 
 
@@ -58,7 +58,8 @@ def write_bench_report(result: BenchResult) -> Path:
 
 
 def learned_on(machine: str, runs: Sequence[BenchRun]) -> list[dict[str, str]]:
-    """What was learned on a machine at the end of the reference along which most was: a row for every run."""
+    """Return the parameters learned on a machine at the end of the reference with the most learning: a row for every
+    run."""
     own = [r for r in runs if r.machine == machine and r.learned]
     along = Counter(r.reference for r in own).most_common(1)
     return [
@@ -69,7 +70,7 @@ def learned_on(machine: str, runs: Sequence[BenchRun]) -> list[dict[str, str]]:
 
 
 def table_of(found: Sequence[Choice]) -> list[dict[str, Any]]:
-    """The decision table: a row for what is known of each machine, a cell for every condition."""
+    """Return the decision table: a row for the knowledge of each machine, a cell for every condition."""
     choice = {(c.machine, c.knowledge, c.condition): c for c in found}
     return [
         {
@@ -81,7 +82,7 @@ def table_of(found: Sequence[Choice]) -> list[dict[str, Any]]:
 
 
 def cell(choice: Choice | None) -> dict[str, str]:
-    """What is chosen, its mean and its worst error over the PD's; a condition without runs has no choice."""
+    """Return the choice, its mean and its worst error relative to the PD's; a condition without runs has no choice."""
     if choice is None:
         return {"label": "not run", "numbers": ""}
     chosen = choice.chosen
@@ -91,16 +92,18 @@ def cell(choice: Choice | None) -> dict[str, str]:
 
 
 def message_of(own: Sequence[Standing]) -> str:
-    """What the picture of a machine shows, in a sentence."""
+    """Return the message of a machine's picture as a sentence."""
     fit = [s for s in own if not s.why_not]
     if not fit:
-        return "None is fit to be switched on: each fails, chatters, hunts, or is somewhere worse than the PD alone."
+        return "None is suitable: each fails, chatters, hunts, or is somewhere worse than the PD alone."
     share = f"{100.0 * fit[0].mean:.2g} %"
-    return f"{fit[0].label} leaves {share} of the error of the PD alone, the least that neither hunts nor chatters."
+    return (
+        f"{fit[0].label} has {share} of the error of the PD alone, the smallest without hunting or chatter."
+    )
 
 
 def row(s: Standing, steady: float, delayed: Standing | None) -> dict[str, str]:
-    """A line of a machine's table."""
+    """Return a row of a machine's table."""
     late = "–" if delayed is None else (delayed.why_not.partition(":")[0] or shown(delayed.mean))
     return {
         "label": s.label, "needs": CATALOGUE[s.compensator].needs, "steady": shown(steady), "mean": shown(s.mean),
@@ -111,7 +114,7 @@ def row(s: Standing, steady: float, delayed: Standing | None) -> dict[str, str]:
 
 
 def shown(value: float | None) -> str:
-    """A ratio for people."""
+    """Return a ratio as text."""
     if value is None or not math.isfinite(value):
         return "–"
     if value >= 1.0:
@@ -120,7 +123,7 @@ def shown(value: float | None) -> str:
 
 
 def dots(title: str, message: str, own: Sequence[Standing]) -> str:
-    """The SVG of a machine: error over that of the PD, mean as a dot and up to the worst case as a bar, logarithmic."""
+    """Return the SVG of a machine: errors relative to the PD's, mean as a dot and worst case as a bar, logarithmic."""
     drawn = [s for s in own if math.isfinite(s.mean)]
     low = min([0.05, *(s.mean for s in drawn)])
     high = max([2.0, *(min(s.worst, 50.0) for s in drawn)])

@@ -1,4 +1,4 @@
-"""What each case shows, in words made from its metrics."""
+"""Captions of cases, generated from their metrics."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from stickslip.analyse.wording import quantity
 from stickslip.study.result import Run
 
-OSCILLATES = 20e-3  # rad/s RMS above 50 Hz; the statements' measure
+OSCILLATES = 20e-3  # rad/s RMS above 50 Hz, as in the statements
 MILLI = (1e3, "mrad")
 HUNTS = 2.0  # reversals/s while the reference is at rest
 
@@ -18,17 +18,17 @@ def _get(run: Run, name: str) -> float:
 
 
 def oscillates(run: Run, at_rest: bool) -> bool:
-    """Whether a run oscillates: at steady state where the reference comes to rest, else by its fast velocity."""
+    """Whether a run oscillates: at steady state if the reference comes to rest, else by its fast velocity."""
     if at_rest:
         return _get(run, "second_half_reversals_per_s") > HUNTS
     return _get(run, "velocity_above_50Hz_rms_rad_s") > OSCILLATES
 
 
 def figure_of_merit(at_rest: bool) -> tuple[str, str]:
-    """The metric by which runs are ranked, and its name.
+    """Return the metric for ranking runs, and its name.
 
-    A reference that comes to rest is judged by its second half, and by the RMS there: the mean would reward a
-    limit cycle around the target.
+    For a reference that comes to rest it is the RMS of the second half, because the mean would favour a limit cycle
+    around the target.
     """
     if at_rest:
         return "second_half_position_rms_rad", "RMS error in the second half"
@@ -36,13 +36,13 @@ def figure_of_merit(at_rest: bool) -> tuple[str, str]:
 
 
 def ranking(runs: Sequence[Run], name: str) -> list[Run]:
-    """Finished runs, the least of a metric first."""
+    """Return finished runs, ordered by a metric, smallest first."""
     done = (r for r in runs if not r.failure and math.isfinite(_get(r, name)))
     return sorted(done, key=lambda r: _get(r, name))
 
 
 def error_of(value: float, factor: float) -> str:
-    """An error (rad) times a factor, as tables write it: three digits, none below a thousandth of the unit."""
+    """Return an error (rad) times a factor as in tables: three digits, none below a thousandth of the unit."""
     scaled = abs(factor * value)
     if scaled < 1e-3:
         return "0" if scaled < 1e-7 else "<0.001"
@@ -56,20 +56,21 @@ def case_message(
     unit: tuple[float, str] = MILLI,
     shown: Sequence[str] | None = None,
 ) -> str:
-    """Which run tracks best; the best compensator where that is another; the other linear controllers.
+    """Return a sentence on the run that tracks best, the best compensator if it is another, and the other linear
+    controllers.
 
     Parameters
     ----------
     runs : sequence of Run
-        All that are compared, those that other figures show included.
+        All runs in the comparison, including those in other figures.
     at_rest : bool
         Whether the reference comes to rest.
     linear : sequence of str
         The controllers without compensator.
     unit : tuple of (float, str)
-        In which all errors are given, its factor from rad first.
+        Factor from rad, and unit, of all errors.
     shown : sequence of str, optional
-        The controllers that the figure shows, where it does not show all.
+        The controllers in the figure, if not all.
     """
     name, words = figure_of_merit(at_rest)
     ranked = ranking(runs, name)
@@ -87,12 +88,12 @@ def case_message(
 
 
 def aside(name: str, shown: Sequence[str] | None) -> str:
-    """That a controller is in another part of a figure, where it is."""
+    """Return a note if a controller is in another part of a figure."""
     return " (another part)" if shown is not None and name not in shown else ""
 
 
 def case_caption(runs: Sequence[Run], at_rest: bool) -> str:
-    """Two or three sentences: the order by error, who oscillates, who stands still."""
+    """Return two or three sentences: the order by error, oscillating runs, runs with standstills."""
     name, words = figure_of_merit(at_rest)
     ranked = ranking(runs, name)
     sentences = [
@@ -106,7 +107,7 @@ def case_caption(runs: Sequence[Run], at_rest: bool) -> str:
             f"{r.controller} ({quantity(_get(r, 'second_half_reversals_per_s'), '/s')})" for r in moving
         )
         sentences.append(
-            f"At steady state {listed} go on moving (reversals)." if moving else "All come to rest."
+            f"At steady state {listed} keep moving (reversals)." if moving else "All come to rest."
         )
     else:
         fast = "velocity_above_50Hz_rms_rad_s"

@@ -1,4 +1,4 @@
-"""The references of what was used: from names, files and records to entries of references.bib."""
+"""Find the references of names, files and records in references.bib."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ from stickslip.study.plan import Study, load, load_run
 from stickslip.study.planned_run import PlannedRun
 
 INTEGRATORS = {"adaptive": ("dormand1980", "sommeijer1998"), "auto": ("dormand1980", "sommeijer1998")}
-"""What an integrator's method is taken from."""
+"""References of the integrators' methods."""
 THESIS = "thesis"
 ENTRY = re.compile(r"^@\w+\{([^,\s]+),.*?^\}", re.MULTILINE | re.DOTALL)
 
 
 def bibliography() -> dict[str, str]:
-    """The entries of references.bib by key."""
+    """Return the entries of references.bib by key."""
     text = Path(stickslip.__file__).with_name("references.bib").read_text(encoding="utf-8")
     return {match[1]: match[0] for match in ENTRY.finditer(text)}
 
 
 def citing(keys: Iterable[str]) -> str:
-    """BibTeX of the package and of the entries.
+    """Return BibTeX of the package and of the entries.
 
     Parameters
     ----------
     keys : iterable of str
-        In any order, several times the same or not.
+        In any order; duplicates are allowed.
 
     Raises
     ------
     InputError
-        If there is no such entry: a law of yours may cite what is not in the package's bibliography.
+        If there is no such entry; your own law may cite works that are not in the package's bibliography.
     """
     known = bibliography()
     missing = sorted(set(keys) - set(known))
     if missing:
         raise InputError(
-            f"{', '.join(missing)} not in the package's references.bib; cite from where the law comes"
+            f"{', '.join(missing)} not in the package's references.bib; see the source of the law"
         )
     return "\n\n".join([itself(), *(known[key] for key in sorted(set(keys)))])
 
 
 def itself() -> str:
-    """The package's own entry."""
+    """Return the package's own entry."""
     return (
         f"@software{{stickslip,\n  title   = {{stickslip: friction of servo axes}},\n"
         f"  version = {{{stickslip.__version__}}},\n  note    = {{Python package, BSD-3-Clause}}\n}}"
@@ -60,13 +60,13 @@ def itself() -> str:
 
 
 def cited_by(things: Sequence[str]) -> set[str]:
-    """Keys of what is used by laws, TOML files, records, manifests or folders of studies.
+    """Return the keys of the references used by laws, TOML files, records, manifests or folders of studies.
 
     Parameters
     ----------
     things : sequence of str
-        Names of laws, paths of laws' files, "thesis", paths of TOML files, of records (.npz), of manifest.json or
-        of the folder around it.
+        Names of laws, paths of law files, "thesis", paths of TOML files, of records (.npz), of manifest.json or of its
+        folder.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def _keys(thing: str) -> Iterator[str]:
         yield from _of_study(_study_in(path if path.is_dir() else path.parent))
     else:
         raise InputError(
-            f"{thing!r} is no law, TOML file, record (.npz), manifest.json or folder of a study; `stickslip laws` "
+            f"{thing!r} is not a law, TOML file, record (.npz), manifest.json or folder of a study; `stickslip laws` "
             "lists the laws"
         )
 

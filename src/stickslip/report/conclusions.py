@@ -1,4 +1,4 @@
-"""What a study says in a few sentences, which its report begins with."""
+"""Conclusions of a study in a few sentences, for the start of its report."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from stickslip.report.captions import figure_of_merit, oscillates, ranking
 from stickslip.study.result import Run
 
 MOST = 1000.0
-"""Times by which an error is said to be smaller."""
+"""Largest ratio of errors to print."""
 
 
 def study_conclusion(view: StudyView, tally: Sequence[Mapping[str, Any]] = ()) -> list[str]:
-    """What compensation did to the error and the calm of the loop, and how the statements fared.
+    """Return sentences on the effect of compensation on error and oscillation, and on the statements.
 
     Parameters
     ----------
@@ -51,11 +51,11 @@ def study_conclusion(view: StudyView, tally: Sequence[Mapping[str, Any]] = ()) -
     if len(pairs) > 1:
         listed = ", ".join(f"{name} {number(middle_of(factors_of(own)))}" for name, own in pairs.items())
         said.append(
-            f"By friction, the best linear controller's error over the best compensator's, median case: {listed}."
+            f"Median improvement of the best compensator over the best linear controller, by friction: {listed}."
         )
     if winners:
         most = max(dict.fromkeys(winners), key=winners.count)
-        said.append(f"Least error most often: {most}, in {winners.count(most)} of {len(winners)} {cases}.")
+        said.append(f"Smallest error most often: {most}, in {winners.count(most)} of {len(winners)} {cases}.")
     said += _calm(view, runs)
     if tally:
         listed = ", ".join(f"{item['count']} {item['words'].removeprefix('statements ')}" for item in tally)
@@ -64,14 +64,14 @@ def study_conclusion(view: StudyView, tally: Sequence[Mapping[str, Any]] = ()) -
 
 
 def helped(pairs: Sequence[tuple[float, float]], cases: str) -> str:
-    """By how much the best compensator's error is smaller than the best linear controller's.
+    """Return a sentence that compares the best compensator's error with the best linear controller's.
 
     Parameters
     ----------
     pairs : sequence of (float, float)
         The errors of the best linear controller and of the best compensator, one pair a case.
     cases : str
-        What they are.
+        Description of the cases.
     """
     factors = factors_of(pairs)
     better = sum(f > 1.0 for f in factors)
@@ -86,23 +86,23 @@ def helped(pairs: Sequence[tuple[float, float]], cases: str) -> str:
 
 
 def factors_of(pairs: Sequence[tuple[float, float]]) -> list[float]:
-    """How many times smaller the second of each pair is, the least first."""
+    """Return the ratios of the pairs, first to second, in ascending order."""
     return sorted(a / b if b > 0.0 else math.inf for a, b in pairs)
 
 
 def middle_of(factors: Sequence[float]) -> float:
-    """Their median: between two, the geometric mean."""
+    """Return their median; between two, the geometric mean."""
     n = len(factors)
     return factors[n // 2] if n % 2 else math.sqrt(factors[n // 2 - 1] * factors[n // 2])
 
 
 def number(factor: float) -> str:
-    """A factor in words; an error that is all but nothing makes none to be printed."""
+    """Return a factor as text, limited because an error may be nearly zero."""
     return f"{factor:.2g}" if factor <= MOST else f"more than {MOST:g}"
 
 
 def _calm(view: StudyView, runs: Sequence[tuple[Run, bool]]) -> list[str]:
-    """How many runs oscillate, with a compensator and without."""
+    """Return a sentence on the number of oscillating runs, with and without a compensator."""
     out: list[str] = []
     for kind, words in ((True, "with a compensator"), (False, "with a linear controller alone")):
         own = [moving for run, moving in runs if bool(view.compensation(run.controller)) is kind]
@@ -114,14 +114,14 @@ def _calm(view: StudyView, runs: Sequence[tuple[Run, bool]]) -> list[str]:
 def rig_conclusion(
     tally: Sequence[Mapping[str, Any]], mains: Mapping[str, tuple[int, int]], pairs: Sequence[tuple[float, float]]
 ) -> list[str]:  # fmt: skip
-    """What the experiments on virtual machines say of the thesis.
+    """Return sentences that compare the experiments on virtual machines with the thesis.
 
     Parameters
     ----------
     tally : sequence of mapping
         ``count`` and ``words`` of its statements.
     mains : mapping of str to (int, int)
-        In how many parts each main statement holds, and of how many.
+        Number of parts in which each main statement holds, and number of parts.
     pairs : sequence of (float, float)
         As in `helped`, one pair a machine, reference and linear controller.
     """
@@ -130,7 +130,7 @@ def rig_conclusion(
     whole = [text for text, (held, of) in mains.items() if held == of]
     part = [f"{text} ({held} of {of} parts)" for text, (held, of) in mains.items() if held < of]
     if whole:
-        said.append(f"Main statements that hold wherever they were tried: {'; '.join(whole)}.")
+        said.append(f"Main statements that hold wherever they were tested: {'; '.join(whole)}.")
     if part:
         said.append(f"Main statements that do not hold everywhere: {'; '.join(part)}.")
     if pairs:

@@ -18,13 +18,13 @@ from stickslip.report.plots import Curve, Panel, draw, envelope, one_prefix
 from stickslip.report.styles import LAWS, REFERENCE, Style, styles_of
 from stickslip.study.result import Run
 
-COMMON = "both"  # folder of the figures that no slip rule changes
-LINES = 7  # as many controllers as one figure still shows
+COMMON = "both"  # folder of the figures that are equal for all slip rules
+LINES = 7  # most controllers in one figure
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure as it was saved.
+    """A saved figure.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Figure:
         The thesis's number, or the empty string.
     title, caption : str
     rule : str
-        Its slip rule; "both" where none changes it.
+        Its slip rule; "both" if it is equal for all.
     stem : Path
         Without .svg and .png.
     """
@@ -48,12 +48,12 @@ class Figure:
 
 
 def named(number: str, fallback: str) -> str:
-    """The file's name: by the thesis's number where there is one."""
+    """Return the file's name: by the thesis's number if there is one."""
     return f"figure-{number or fallback}"
 
 
 def reference_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
-    """Position and velocity of every reference (thesis figures 3.15 to 3.17)."""
+    """Draw position and velocity of every reference (thesis figures 3.15 to 3.17)."""
     for reference in view.references:
         run = next((r for r in view.result.runs if r.reference == reference and not r.failure), None)
         if run is None:
@@ -80,18 +80,18 @@ def reference_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
 
 
 def heading(number: str, text: str) -> str:
-    """`Figure 3.21 · text`, or the text alone."""
+    """Return `Figure 3.21 · text`, or the text alone."""
     return f"Figure {number} · {text}" if number else text
 
 
 def what(view: StudyView, reference: str) -> str:
-    """A reference's kind and parameters in a line."""
+    """Return a reference's kind and parameters in one line."""
     run = next(r for r in view.result.runs if r.reference == reference)
     return describe(run.record().meta["reference"])
 
 
 def describe(reference: Mapping[str, Any]) -> str:
-    """A reference's kind and its single numbers with their units, `sine, amplitude 0.01 rad`."""
+    """Return a reference's kind and its single numbers with their units, `sine, amplitude 0.01 rad`."""
     units = {f.name: f.par.unit for f in reference_kind(reference["kind"]).fields}
     numbers = {k: v for k, v in reference.items() if isinstance(v, (int, float))}
     return ", ".join(
@@ -100,7 +100,7 @@ def describe(reference: Mapping[str, Any]) -> str:
 
 
 def steady_window(record: Record) -> tuple[float, float] | None:
-    """The beginning of a motion that is over early, s; None shows all of it."""
+    """Return the interval to show of a motion that ends early, s; None: all of it."""
     moving = np.flatnonzero(
         np.abs(record["velocity_reference"]) > 1e-3 * np.max(np.abs(record["velocity_reference"]))
     )
@@ -113,7 +113,7 @@ def steady_window(record: Record) -> tuple[float, float] | None:
 
 @dataclass(frozen=True)
 class Case:
-    """What one result figure compares."""
+    """The runs that one result figure compares."""
 
     rule: str
     reference: str
@@ -121,13 +121,13 @@ class Case:
     kind: str
     runs: Sequence[Run]
     every: Sequence[Run]
-    """Those of the case's other parts too, where one figure does not hold all."""
+    """Including those of the case's other figures."""
     part: int = 0
     parts: int = 1
 
     @property
     def name(self) -> str:
-        """For the file, where the thesis gives no number."""
+        """Name of the file without a number of the thesis."""
         words = [
             self.reference,
             self.friction,
@@ -138,7 +138,8 @@ class Case:
 
 
 def result_cases(view: StudyView, rule: str) -> Iterator[Case]:
-    """The figures' cases: controllers without compensator beside those of each kind, few enough to tell apart."""
+    """Return the cases of figures: controllers without compensator and those of each kind, few enough to
+    distinguish."""
     for friction in view.frictions:
         for reference in view.references:
             runs = view.group(rule, reference, friction)
@@ -156,7 +157,7 @@ def result_cases(view: StudyView, rule: str) -> Iterator[Case]:
 
 
 def result_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
-    """Position and position error of every case, under every slip rule (thesis figures 3.21 to 3.38)."""
+    """Draw position and position error of every case, for every slip rule (thesis figures 3.21 to 3.38)."""
     for rule in view.rules:
         for case in result_cases(view, rule):
             number = view.edition.results.get((case.reference, case.friction, case.kind), "")
@@ -180,7 +181,7 @@ def result_figures(view: StudyView, folder: Path) -> Iterator[Figure]:
 
 
 def titled(view: StudyView, case: Case) -> str:
-    """A case in words, and which part of it a figure shows."""
+    """Return the title of a case, with the part that a figure shows."""
     reference = view.edition.references.get(case.reference, f"reference {case.reference}")
     plant = "friction" if case.friction in view.result.config.get("friction", {}) else "machine"
     friction = view.edition.frictions.get(case.friction, f"{plant} {case.friction}")
@@ -190,19 +191,20 @@ def titled(view: StudyView, case: Case) -> str:
 
 
 def records_of(case: Case) -> dict[str, Record]:
-    """The records of a case's runs by controller, without those that are missing or end at once."""
+    """Return the records of a case's runs by controller, without missing or empty ones."""
     records = {r.controller: r.record() for r in case.runs if r.path.exists()}
     return {name: record for name, record in records.items() if len(record) > 1}
 
 
 def error_sizes(records: Mapping[str, Record], at_rest: bool) -> dict[str, float]:
-    """Largest error of each record (rad); at rest of its second half, which leaves the transient aside."""
+    """Return the largest error of each record (rad); for a resting reference that of its second half, without the
+    transient."""
     errors = {name: r["position_reference"] - r["position"] for name, r in records.items()}
     return {name: float(np.max(np.abs(e[e.size // 2 if at_rest else 0 :]))) for name, e in errors.items()}
 
 
 def error_limit(case: Case, records: Mapping[str, Record], at_rest: bool) -> float:
-    """Half height of the error's axis, rad."""
+    """Return half the height of the error axis, rad."""
     return readable_limit(sorted(error_sizes(records, at_rest).values()), case.kind == "feedback")
 
 
@@ -210,7 +212,7 @@ def result_panels(
     case: Case, records: Mapping[str, Record], limit: float, controllers: Sequence[str], unit: tuple[float, str],
     at_rest: bool,
 ) -> list[Panel]:  # fmt: skip
-    """Position above, error below; errors far beyond the others' are left off the scale and named.
+    """Return the panels: position above, error below; much larger errors are off the scale and named.
 
     Parameters
     ----------
@@ -220,9 +222,9 @@ def result_panels(
     limit : float
         Half height of the error's axis, rad.
     controllers : sequence of str
-        Of the whole study, which decide on the styles.
+        Of the whole study, which determine the styles.
     unit : tuple of (float, str)
-        Of both axes, its factor from rad first.
+        Factor from rad, and unit, of both axes.
     at_rest : bool
         Whether the reference comes to rest.
     """
@@ -230,14 +232,14 @@ def result_panels(
     errors = {name: r["position_reference"] - r["position"] for name, r in records.items()}
     sizes = error_sizes(records, at_rest)
     factor, named_unit = unit
-    # Far outside the axes a line need not go on.
+    # Far outside the axes a line may end.
     shown = {n: np.clip(e, -2 * limit, 2 * limit) for n, e in errors.items()}
     styles = styles_of(controllers)
     # The legend's handles, in the study's order.
     positions = [Curve(first.time[:0], first.time[:0], n, styles[n]) for n in records]
     positions.insert(0, Curve(first.time[:0], first.time[:0], "reference", REFERENCE))
     deviations: list[Curve] = []
-    # Large errors first, so that small ones are drawn over them.
+    # Large errors first, so small ones are drawn over them.
     for name in sorted(records, key=lambda n: -sizes[n]):
         record, style = records[name], styles[name]
         positions.append(Curve(*envelope(record.time, factor * record["position"]), "", style))
@@ -257,16 +259,17 @@ def result_panels(
 
 
 def off_scale(sizes: Mapping[str, float], limit: float, unit: tuple[float, str], at_rest: bool) -> str:
-    """Which errors (rad) go beyond the limit, and how far in a unit (its factor from rad first)."""
+    """Return a note on errors (rad) beyond the limit, with their size in a unit (its factor from rad first)."""
     words = [f"{name} {error_of(size, unit[0])}" for name, size in sizes.items() if size > limit]
     what = "off scale in the second half" if at_rest else "off scale"
     return f"{what}: {', '.join(words)} {unit[1]}" if words else ""
 
 
 def readable_limit(sizes: Sequence[float], feedback: bool) -> float:
-    """Half height of the error's axis (rad) at which the small errors are still seen, from all, ascending.
+    """Return half the height of the error axis (rad) at which small errors are visible, from all errors in ascending
+    order.
 
-    In feedback the good runs are better by orders of magnitude, so that the axis is made for them.
+    With feedback the good runs are better by orders of magnitude, so the axis is scaled for them.
     """
     usual = sizes[(len(sizes) - 1) // (3 if feedback else 2)]
     return 1.35 * max(size for size in sizes if size <= 2.5 * usual) or 1e-6

@@ -1,4 +1,4 @@
-"""The report of a study: one HTML file that needs nothing but itself."""
+"""Write the report of a study: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ READING = Note(
     "Reading the metrics",
     "A standstill is |v| below 1e-3 rad/s for at least 10 ms while |v_d| is above 2e-3 rad/s. Reversals are sign "
     "changes of the velocity through a trigger of ±1e-3 rad/s. A limit cycle has at least 5 periods in the last "
-    "40 % whose amplitudes and periods spread by less than 5 %. Settling is the entry for good into 2 % of the "
-    "step. The steady-state error is the mean over the last 20 %.",
+    "40 % whose amplitudes and periods vary by less than 5 %. Settling is the time after which the position "
+    "stays within 2 % of the step. The steady-state error is the mean over the last 20 %.",
 )
 
 
 OF_MACHINES = Note(
     "Metrics of machines",
-    "Metrics of a machine with imperfections are taken between the ends of its samples, the position as a cubic and "
-    "the velocity as a straight line. Reversals, standstills and velocities within a sample are not seen: these "
-    "metrics can be compared among machines of one sample time, and not with those of axes under [axis].",
+    "Metrics of a machine with imperfections are computed from its samples, with the position as a cubic and the "
+    "velocity as a straight line between them. Reversals, standstills and velocities within a sample are not seen: "
+    "compare these metrics only between machines of equal sample time, not with those of axes under [axis].",
 )
 
 
 def render(view: StudyView, figures: Sequence[Figure]) -> str:
-    """The report's HTML."""
+    """Return the report's HTML."""
     asked = view.edition.claims
     verdicts = {rule: judge(view, rule, asked) for rule in view.rules} if asked else {}
     manifest = view.result.manifest
@@ -64,7 +64,7 @@ def render(view: StudyView, figures: Sequence[Figure]) -> str:
 
 
 def _ran(view: StudyView) -> str:
-    """What was run, in a line."""
+    """Return a line on the runs."""
     count = len(view.result.runs)
     seconds = sum(run.seconds for run in view.result.runs)
     words = [
@@ -79,7 +79,7 @@ def _ran(view: StudyView) -> str:
 
 
 def _tally(claims: Sequence[Claim], verdicts: Mapping[str, Mapping[str, Verdict]]) -> list[dict[str, Any]]:
-    """How many statements hold under which rules."""
+    """Return the number of statements that hold, by slip rule."""
     if not verdicts:
         return []
     counts: dict[str, int] = {}
@@ -97,12 +97,12 @@ def _tally(claims: Sequence[Claim], verdicts: Mapping[str, Mapping[str, Verdict]
 
 
 def _resting(view: StudyView) -> list[str]:
-    """The references that come to rest."""
+    """Return the references that come to rest."""
     return [r for r in view.references if view.reference_kind(r) == "step"]
 
 
 def _summary(view: StudyView) -> list[str]:
-    """Which controllers are best how often, and what failed."""
+    """Return lines on the best controllers and on failed runs."""
     lines: list[str] = []
     resting = _resting(view)
     halves = f" ({', '.join(resting)}: in the second half)" if resting else ""
@@ -115,14 +115,14 @@ def _summary(view: StudyView) -> list[str]:
                     wins[run.controller] = wins.get(run.controller, 0) + 1
         listed = ", ".join(f"{name} {n}" for name, n in sorted(wins.items(), key=lambda item: -item[1]))
         lines.append(
-            f"Least RMS position error of {sum(wins.values())} cases{halves}, {rule} rule: {listed or 'none'}."
+            f"Smallest RMS position error in {sum(wins.values())} cases{halves}, {rule} rule: {listed or 'none'}."
         )
     failed = sum(bool(run.failure) for run in view.runs.values())
     return [*lines, f"{failed} of {len(view.runs)} runs failed." if failed else "No run failed."]
 
 
 def _overview(view: StudyView) -> list[dict[str, Any]]:
-    """The least error of every reference and friction, rule by rule."""
+    """Return the smallest error of every reference and friction, for each rule."""
     linear = [c for c in view.controllers if not view.compensation(c)]
     rows: list[dict[str, Any]] = []
     for reference in view.references:
@@ -162,7 +162,7 @@ def _claim(
 
 
 def _parts(view: StudyView, figures: Sequence[Figure]) -> list[dict[str, Any]]:
-    """The figures in parts: those that no rule changes, then the results under each rule."""
+    """Return the figures in parts: those that are equal for all rules, then the results for each rule."""
     parts: list[dict[str, Any]] = []
     for rule in (COMMON, *view.rules):
         chosen = [_embedded(f) for f in figures if f.rule == rule]
@@ -173,19 +173,19 @@ def _parts(view: StudyView, figures: Sequence[Figure]) -> list[dict[str, Any]]:
 
 
 def _embedded(figure: Figure) -> dict[str, Any]:
-    """A figure for the template, with its files inside."""
+    """Return a figure for the template, with its files embedded."""
     return {"id": figure.id, "title": figure.title, "caption": figure.caption, **image(figure.stem)}
 
 
 def image(stem: Path) -> dict[str, Any]:
-    """One of a figure's two files, `embedded`: the SVG, unless dense oscillations make it larger than the PNG."""
+    """Return one of a figure's files, `embedded`: the SVG, unless dense oscillations make it larger than the PNG."""
     svg = stem.with_name(stem.name + ".svg")
     png = stem.with_name(stem.name + ".png")
     return embedded(svg if svg.stat().st_size <= 1.5 * png.stat().st_size else png)
 
 
 def _brief(manifest: Mapping[str, Any]) -> dict[str, Any]:
-    """The manifest without every run's metrics, which the tables show."""
+    """Return the manifest without the metrics of the runs, which are in the tables."""
     brief = {k: v for k, v in manifest.items() if k not in ("runs", "configuration")}
     if "runs" in manifest:
         brief["runs"] = f"{len(manifest['runs'])}, listed in manifest.json"
@@ -193,7 +193,7 @@ def _brief(manifest: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def notes(view: StudyView) -> list[Note]:
-    """The notes that apply to a study."""
+    """Return the notes that apply to a study."""
     edition = view.edition
     ruled = () if edition.before or view.rules == ["signed"] else (SLIP,)
     machines = (OF_MACHINES,) if view.result.config.get("machines") else ()
@@ -201,7 +201,7 @@ def notes(view: StudyView) -> list[Note]:
 
 
 def starts(view: StudyView) -> list[Note]:
-    """Which runs depend on their start, if any do."""
+    """Return the note on runs that depend on their start, if any."""
     named = [run.key for run in view.runs.values() if run.depends_on_start]
     text = (
         "From an initial position shifted by 1e-9 rad, these runs take another branch of the motion, and their "

@@ -1,4 +1,4 @@
-"""Pictures of an identification: draws `stickslip.identify.estimate.Picture` in the house style."""
+"""Draw pictures of an identification (`stickslip.identify.estimate.Picture`) in the house style."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stickslip.report.styles import REFERENCE, Style
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 HEIGHT = 2.7
-"""Of a picture's axes, inches."""
+"""Height of a picture's axes, inches."""
 LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES: tuple[Any, ...] = (
     "-",
@@ -28,7 +28,7 @@ DASHES: tuple[Any, ...] = (
 
 
 def draw_picture_to(picture: Picture, target: Path) -> Path:
-    """Draw one picture into a file whose suffix says the format (.png, .svg, .pdf).
+    """Draw one picture into a file; the suffix determines the format (.png, .svg, .pdf).
 
     Raises
     ------
@@ -40,7 +40,7 @@ def draw_picture_to(picture: Picture, target: Path) -> Path:
 
 
 def panel_of(picture: Picture) -> plots.Panel:
-    """The picture in the house style: colours, dashes, small values in milli and micro."""
+    """Return the picture in the house style: colours, dashes, small values in milli and micro."""
     styles = iter(zip(LINES, DASHES, strict=True))
     x_factor, x_label = _readable(picture.x_label, [t.x for t in picture.traces])
     if picture.x_scale == "log":
@@ -65,7 +65,7 @@ def panel_of(picture: Picture) -> plots.Panel:
 
 
 def _readable(label: str, values: Sequence[Array]) -> tuple[float, str]:
-    """Factor and label in which small values read well: milli or micro before the unit in the label."""
+    """Return factor and label for small values: milli or micro before the unit in the label."""
     words, _, unit = label.rpartition(" (")
     if not words or unit in ("-)", "s)"):
         return 1.0, label

@@ -1,4 +1,4 @@
-"""The report of an identification: one HTML file that needs nothing but itself."""
+"""Write the report of an identification: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from stickslip.report.svg import embedded_svg
 from stickslip.whole_files import write_whole
 
 TABLE = 15
-"""Estimates beyond which a table of all correlations is too wide to read."""
+"""Number of estimates above which a table of all correlations is too wide."""
 STRONG = 0.9
 GREEK = {
     "sigma": "σ",
@@ -54,7 +54,7 @@ LABELS = {
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """One record as the report shows it: name, what the check found in it, and where it comes from."""
+    """One record in the report: name, findings and source."""
 
     name: str
     record: Record
@@ -76,14 +76,14 @@ def write_identification(
         Of the HTML file.
     found : Identification
     sources : sequence of Source
-        The records with what the doctor found.
+        The records with the doctor's findings.
     title : str
     versions : mapping
-        Of what took part.
+        Versions of the software.
     headline : sequence of (str, str)
-        What stands first: a word and a line each.
+        Lines at the top: a word and a text each.
     model_file : path, optional
-        Of the model, as the next command names it; beside the report unless given.
+        Path of the model in the next command; default: next to the report.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def rendered(
     headline: Sequence[tuple[str, str]] = (),
     model_file: str | os.PathLike[str] = "model.toml",
 ) -> str:
-    """The HTML."""
+    """Return the HTML."""
     fitted = [s for s in sources if not s.held_out]
     records = [s.record for s in fitted]
     answers = answers_of(found, records, Path(model_file), files_of(fitted))
@@ -151,7 +151,7 @@ def rendered(
 
 
 def ran(found: Identification, sources: Sequence[Source], versions: Mapping[str, str]) -> str:
-    """What was done, in a line."""
+    """Return a line on method and records."""
     rows = sum(len(s.record) for s in sources)
     words = (
         f"Method {found.method.replace('_', ' ')} on {len(sources)} record{'s' if len(sources) != 1 else ''}"
@@ -161,12 +161,12 @@ def ran(found: Identification, sources: Sequence[Source], versions: Mapping[str,
 
 
 def files_of(sources: Sequence[Source]) -> list[str]:
-    """The files of the records, each once."""
+    """Return the files of the records without duplicates."""
     return [f for f in dict.fromkeys(str(s.about.get("file", "")) for s in sources) if f]
 
 
 def headed(pictures: Sequence[Picture], rest: Sequence[Picture]) -> tuple[list[Picture], list[Picture]]:
-    """What stands at the head: the curve of friction, and the torque measured beside that of the model."""
+    """Return the pictures at the top: the friction curve, and measured and model torque."""
     curve = [p for p in pictures if p.name == "sliding-curve"][:1]
     torque = [p for p in pictures if p.name in ("torque-stretch", "torque-velocity")]
     others = [p for p in pictures if p not in rest and p not in torque]
@@ -174,13 +174,13 @@ def headed(pictures: Sequence[Picture], rest: Sequence[Picture]) -> tuple[list[P
 
 
 def open_loop(found: Identification) -> bool:
-    """Whether misfits of a position are those of a simulation that the recorded torque alone drives."""
+    """Whether position misfits come from an open-loop simulation with the recorded torque."""
     output = found.details.get("output")
     return isinstance(output, FittedAxis) and not all(t.closed_loop for t in output.problem.experiments)
 
 
 def tally(found: Identification, sources: Sequence[Source]) -> list[dict[str, Any]]:
-    """Numbers that say at a glance how it went."""
+    """Return the key numbers of the result."""
     good = sum(e.identified for e in found.estimates)
     warnings = sum(f.level == "warning" for s in sources for f in s.findings)
     out: list[dict[str, Any]] = [
@@ -214,21 +214,21 @@ def tally(found: Identification, sources: Sequence[Source]) -> list[dict[str, An
 
 
 def number(value: float) -> str:
-    """A number for people."""
+    """Return a number as text."""
     if not math.isfinite(value):
         return "no limit" if math.isinf(value) else "unknown"
     return f"{value:.4g}"
 
 
 def interval(e: Estimate) -> str:
-    """The 95 % interval in words."""
+    """Return the 95 % interval as text."""
     if math.isnan(e.lower) or math.isnan(e.upper):
         return "unknown"
     return "-" if e.undetermined else " to ".join(ends(e.value, e.lower, e.upper))
 
 
 def shown(e: Estimate, meaning: str = "") -> dict[str, Any]:
-    """An estimate as a row; where the interval tells nothing, the value does not either."""
+    """Return an estimate as a row; if the interval is unlimited, the value is not shown."""
     value, verdict, chosen = number(e.value), e.verdict, ""
     if e.undetermined:
         value, chosen = "not determined", f"the model's {value} is one choice among many"
@@ -241,7 +241,7 @@ def shown(e: Estimate, meaning: str = "") -> dict[str, Any]:
 
 
 def known(h: Held, meaning: str) -> dict[str, Any]:
-    """A number that was given as a row."""
+    """Return a given number as a row."""
     return {
         "name": h.name, "meaning": meaning, "unit": h.unit, "value": number(h.value), "interval": "-", "given": True,
         "symbol": symbol(h.symbol if meaning else ""),
@@ -249,13 +249,13 @@ def known(h: Held, meaning: str) -> dict[str, Any]:
 
 
 def symbol(text: str) -> tuple[str, str]:
-    """A symbol in letters of the field, and its index: sigma_2 as σ and 2, and F_C^-, of v < 0, as F and C⁻."""
+    """Return a symbol and its index: sigma_2 as σ and 2, and F_C^-, for v < 0, as F and C⁻."""
     base, _, index = text.partition("_")
     return GREEK.get(base, base), index.replace("^-", "⁻")
 
 
 def source(s: Source) -> dict[str, Any]:
-    """A record as the report lists it."""
+    """Return a record for the report's list."""
     seconds = float(s.record.time[-1] - s.record.time[0]) if len(s.record) else 0.0
     reading: Mapping[str, Any] = s.record.meta.get("reading", {})
     channels = ", ".join(
@@ -269,7 +269,7 @@ def source(s: Source) -> dict[str, Any]:
 
 
 def comparison_of(found: Identification) -> tuple[list[str], list[dict[str, Any]]]:
-    """Columns and rows of the comparison of laws; empty where one alone was tried."""
+    """Return columns and rows of the comparison of laws; empty for a single law."""
     rows: list[dict[str, Any]] = []
     chosen = found.model.law.name if found.model else ""
     for c in found.details.get("candidates", ()):
@@ -288,7 +288,7 @@ def comparison_of(found: Identification) -> tuple[list[str], list[dict[str, Any]
 
 
 def correlation(found: Identification) -> dict[str, Any]:
-    """Names and rows of the correlation, those beyond 0.9 marked."""
+    """Return names and rows of the correlation, with values above 0.9 marked."""
     names = [e.name for e in found.estimates]
     none: dict[str, Any] = {"names": [], "rows": [], "pairs": [], "many": 0}
     if len(names) < 2 or found.correlation.shape != (len(names), len(names)):

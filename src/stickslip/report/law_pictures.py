@@ -1,7 +1,7 @@
-"""The picture of a law: what it answers to a slow sine, to small motion, and to steps in velocity.
+"""Draw a law: its response to a slow sine, to small motion, and to steps in velocity.
 
-It is made from the law's own `step`, whatever the law: built in, installed, or a file of a user. The scales of
-the motions are read off the law (`scales_of`), so that a new law needs nothing but its description.
+The picture is computed from the law's own `step`, for any law: built in, installed, or a user's file. The scales of the
+motions are determined from the law (`scales_of`), so a new law needs only its description.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from stickslip.simulation.prescribed.motion import Samples, packed_numbers, torq
 from stickslip.spec import Law
 from stickslip.whole_files import draft_of
 
-USUAL_VELOCITY = 0.01  # rad/s, for a law that declares no scale: the thesis's Stribeck velocity
-USUAL_DISTANCE = 1e-4  # rad, for a law without pre-sliding
+USUAL_VELOCITY = 0.01  # rad/s, for a law without a declared scale: the thesis's Stribeck velocity
+USUAL_DISTANCE = 1e-4  # rad, for a law without presliding
 RISING = Style("#D55E00", (0, (4, 1.2)), 1.4)
 FALLING = Style("#0072B2", "-", 1.2)
 OUTER = Style("#777777", "-", 1.0)
@@ -37,7 +37,7 @@ TORQUE = Style("#0072B2", "-", 1.4)
 
 @dataclass(frozen=True)
 class Response:
-    """A law's answer to a motion that starts at rest: arrays of shape (n,).
+    """A law's response to a motion that starts at rest: arrays of shape (n,).
 
     Attributes
     ----------
@@ -51,20 +51,20 @@ class Response:
     torque: Array
 
     def part(self, chosen: Any) -> Response:
-        """The rows of a slice or a mask."""
+        """Return the rows of a slice or a mask."""
         return Response(self.time[chosen], self.position[chosen], self.velocity[chosen], self.torque[chosen])
 
 
 @dataclass(frozen=True)
 class Scales:
-    """Over which velocity (rad/s) and displacement (rad) a law's torque changes."""
+    """Velocity (rad/s) and displacement (rad) over which a law's torque changes."""
 
     velocity: float
     distance: float
 
 
 def follow(model: Model, time: Any, velocity: Any) -> Response:
-    """March a contact that starts at rest along velocities that are linear between the times.
+    """Simulate a contact that starts at rest along velocities that are linear between the times.
 
     Parameters
     ----------
@@ -74,16 +74,16 @@ def follow(model: Model, time: Any, velocity: Any) -> Response:
     """
     before, after, span = velocity[:-1], velocity[1:], np.diff(time)
     position = np.concatenate([[0.0], np.cumsum(0.5 * (before + after) * span)])
-    # A jump is a step of no length from the new velocity: nothing moves while it lasts.
+    # A jump is a step of zero length with the new velocity, without motion.
     samples = Samples(flat(time), position, np.where(span > 0.0, before, after), flat(after))
     torque = torque_along(model.law, packed_numbers(model), model.parameters, samples)
     return Response(np.asarray(time, float), position, np.asarray(velocity, float), torque)
 
 
 def scales_of(model: Model) -> Scales:
-    """Read the scales of a law off its answers.
+    """Determine the scales of a law from its responses.
 
-    The velocity is what the law declares; the displacement is where a creeping contact reaches 90 % of its
+    The velocity is that declared by the law; the displacement is that at which a creeping contact reaches 90 % of its
     largest torque.
     """
     law = model.law
@@ -96,7 +96,8 @@ def scales_of(model: Model) -> Scales:
 
 
 def slow_sine(model: Model, scales: Scales) -> Response:
-    """The second period of a sinusoidal velocity, five times the velocity's scale and long against pre-sliding."""
+    """Return the second period of a sinusoidal velocity, with five times the velocity scale and travel much longer than
+    presliding."""
     peak, n = 5.0 * scales.velocity, 6000
     w = peak / (1000.0 * scales.distance)
     time = np.arange(2 * n + 1) * (2.0 * math.pi / w / n)
@@ -104,7 +105,7 @@ def slow_sine(model: Model, scales: Scales) -> Response:
 
 
 def presliding(model: Model, scales: Scales) -> tuple[Response, Response]:
-    """A slow loop of small motion, and a smaller loop that interrupts it on its way up: (all of it, inner loop)."""
+    """Return a slow loop of small motion, and a smaller inner loop that interrupts it: (all, inner loop)."""
     turns = [scales.distance * x for x in (0.0, 1.6, -1.6, 0.7, -0.7, 1.6)]
     speed, n = 1e-3 * scales.velocity, 1500
     time, velocity = [0.0], [0.0]
@@ -120,7 +121,8 @@ def presliding(model: Model, scales: Scales) -> tuple[Response, Response]:
 
 
 def velocity_steps(model: Model, scales: Scales) -> tuple[Response, tuple[float, float, float]]:
-    """From rest to a low velocity, to a high one, and back; each lasts until the torque is settled."""
+    """Return the response to steps from rest to a low velocity, to a high one, and back; each lasts until the torque
+    has settled."""
     levels = (0.2 * scales.velocity, 3.0 * scales.velocity, 0.2 * scales.velocity)
     took = 20.0 * scales.distance / levels[0]
     for _ in range(8):
@@ -142,7 +144,7 @@ def _steps(model: Model, levels: Sequence[float], took: float) -> Response:
 
 
 def units_of(law: Law) -> tuple[str, str]:
-    """Units of torque and of position: N·m and rad, or N and m for a law described for a linear axis."""
+    """Return the units of torque and position: N·m and rad, or N and m for a law of a linear axis."""
     units = " ".join(f.par.unit for f in (*law.fields, *law.state_fields))
     rotary = "rad" in units or "N·m" in units or "N" not in units
     return ("N·m", "rad") if rotary else ("N", "m")
@@ -179,7 +181,7 @@ def draw_law(model: Model, *targets: Path) -> None:
 
 
 def draw_gallery(models: Sequence[Model], path: Path) -> None:
-    """Draw the loops in pre-sliding and along a slow sine of many laws side by side, for comparison.
+    """Draw the loops of many laws in presliding and along a slow sine, side by side.
 
     Parameters
     ----------
@@ -205,14 +207,14 @@ def draw_gallery(models: Sequence[Model], path: Path) -> None:
             _sketch(
                 figure.add_subplot(rows, columns, place + columns), loop.position, loop.torque, "position"
             )
-        # No date in the file: the same laws give the same bytes.
+        # No date in the file, so equal laws give equal bytes.
         undated = {"metadata": {DATES[path.suffix]: None}} if path.suffix in DATES else {}
         with draft_of(path, "plot") as draft:
             figure.savefig(draft, format=path.suffix[1:], dpi=DPI, **undated)
 
 
 def _sketch(axes: Any, x: Array, y: Array, word: str) -> None:
-    """A curve without numbers, on its zero lines."""
+    """Draw a curve without numbers, with its zero lines."""
     axes.axhline(0.0, color="#bbbbbb", linewidth=0.5)
     axes.axvline(0.0, color="#bbbbbb", linewidth=0.5)
     axes.plot(x, y, color=TORQUE.colour, linewidth=1.1)
@@ -222,7 +224,7 @@ def _sketch(axes: Any, x: Array, y: Array, word: str) -> None:
 
 
 def _described(model: Model) -> str:
-    """The parameters in a line or two."""
+    """Return the parameters in one or two lines."""
     words: list[str] = []
     for f in model.law.fields:
         value = getattr(model.parameters, f.name)
@@ -232,7 +234,7 @@ def _described(model: Model) -> str:
 
 
 def _readable(answer: Response, label: tuple[str, str]) -> tuple[Response, float, str]:
-    """The answer with its torque in a unit that reads well, the factor, and the axis's label."""
+    """Return the response with its torque in a readable unit, the factor, and the label of the axis."""
     factor, unit = scaled(float(np.max(np.abs(answer.torque))), label[1])
     readable = Response(answer.time, answer.position, answer.velocity, factor * answer.torque)
     return readable, factor, f"{label[0]} ({unit})"
@@ -256,7 +258,7 @@ def _gaining(answer: Response) -> Any:
 
 
 def _where(answer: Response, chosen: Any) -> Response:
-    """The answer with gaps where it is not chosen, joined to its neighbours."""
+    """Return the response with gaps where it is not selected, joined to its neighbours."""
     wide = chosen | np.roll(chosen, 1)
     return Response(answer.time, answer.position, answer.velocity, np.where(wide, answer.torque, np.nan))
 
@@ -265,12 +267,12 @@ def _presliding_panel(outer: Response, inner: Response, label: tuple[str, str], 
     outer, times, y_label = _readable(outer, label)
     reach = float(np.max(np.abs(outer.position)))
     factor, unit = scaled(reach, unit)
-    limits = (-1.1 * factor * reach, 1.9 * factor * reach)  # room for the names
+    limits = (-1.1 * factor * reach, 1.9 * factor * reach)  # space for the names
     curves = [
         Curve(factor * outer.position, outer.torque, "outer loop", OUTER),
         Curve(factor * inner.position, times * inner.torque, "inner loop", INNER),
     ]
-    note = "pre-sliding: slow motion, reversed inside a larger one"
+    note = "presliding: slow motion, with an inner reversal"
     return Panel(curves, y_label, f"position ({unit})", limits, note=note, legend="lower right")
 
 

@@ -1,4 +1,4 @@
-"""What to do after an identification: the next commands, towards a drive or towards another record."""
+"""Next steps after an identification: commands towards a drive or towards another record."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from stickslip.report.after_a_map import after_a_map
 from stickslip.report.sliding_torque import beaten, sliding_of
 
 OWN_LOOP = (*Gains._fields, *Cascade._fields, "filter", "limit", REFERENCE_VELOCITY)
-"""Numbers of an identification's --loop that a recommendation's has too."""
+"""Numbers of an identification's --loop that apply to a recommendation too."""
 OPTIONS = "  # with the options of this run"
 HEAVY = 0.25
-"""Of friction's level: a torque once a turn from which on it may be a weight."""
+"""Share of the friction level above which a torque with one period per turn may be a weight."""
 FINEST = 1e-8
-"""m: finer steps are those of printed digits."""
+"""m: smaller steps are those of printed digits."""
 BY_A_RIG = "stickslip rig run "
-"""How its command begins."""
+"""Start of its command."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """A command, or an advice where there is none: what it is for, and the line to copy (empty for none).
+    """A command or advice: its purpose, and the line to copy (empty for advice).
 
-    In a shell, and in Python, where the result is called ``found``.
+    For a shell, and for Python, where the result is called ``found``.
     """
 
     what: str
@@ -49,12 +49,14 @@ class Step:
 def next_steps(
     found: Identification, records: Sequence[Record], model_file: str | Path, files: Sequence[str]
 ) -> list[Step]:  # fmt: skip
-    """The next commands: towards a setting where what matters is identified, towards another record where not."""
+    """Return the next commands: towards a setting if the relevant numbers are identified, else towards another
+    record."""
     return [*weighed(found, files, str(model_file)), *further_steps(found, records, model_file, files)]
 
 
 def weighed(found: Identification, files: Sequence[str], model_file: str) -> list[Step]:
-    """To identify with gravity, where the angle shows a weight that nobody has named: it is in the friction else."""
+    """Return the step to identify with gravity if the angle shows an unnamed weight, which friction would contain
+    otherwise."""
     axis = found.details.get("axis")
     if not isinstance(axis, ServoAxis) or axis.gravity == "pendulum" or found.method == "cogging":
         return []
@@ -76,12 +78,12 @@ def weighed(found: Identification, files: Sequence[str], model_file: str) -> lis
 def further_steps(
     found: Identification, records: Sequence[Record], model_file: str | Path, files: Sequence[str]
 ) -> list[Step]:  # fmt: skip
-    """As `next_steps`, of an axis whose weight is named."""
+    """As `next_steps`, for an axis whose weight is named."""
     wanted = [Step(s) for s in found.measure_next]
     if found.method == "cogging":
         return [*wanted, Step(*after_a_map(found, model_file))]
     if found.model is None:
-        # A procedure for one thing: the law is told by sliding.
+        # A procedure for one purpose: sliding determines the law.
         command = f"stickslip identify sliding.npz --method sliding --out {shlex.quote(str(model_file))}"
         return [*wanted, *rig_runs(["sliding"], "For the whole law"), Step("And identify it:", command)]
     sliding = sliding_of(found)
@@ -100,7 +102,7 @@ def further_steps(
 
 
 def lacking(found: Identification) -> list[str]:
-    """Names of the numbers without which nothing can be built: inertia, a pendulum's gravity, and friction's level."""
+    """Return the names of missing essential numbers: inertia, a pendulum's gravity, and the friction level."""
     names = {e.name.rpartition(".")[2]: e for e in found.estimates}
     levels = [n for n in names if n in ("fc", "fc_negative")]
     if not levels:
@@ -111,7 +113,7 @@ def lacking(found: Identification) -> list[str]:
 
 
 def forward(found: Identification, records: Sequence[Record], model_file: str) -> list[Step]:
-    """From a model that holds what matters to a drive."""
+    """Return the steps from a model with the essential numbers to a drive."""
     model = shlex.quote(model_file)
     if found.details.get("mechanics") is None and not any(e.name == "inertia" for e in found.estimates):
         return [
@@ -138,7 +140,7 @@ def forward(found: Identification, records: Sequence[Record], model_file: str) -
 
 
 def drive_in(records: Sequence[Record]) -> dict[str, str]:
-    """Options of a recommendation as far as the records tell them."""
+    """Return the options of a recommendation that follow from the records."""
     loops = {str(r.meta.get("loop", "")) for r in records}
     loop = loops.pop() if len(loops) == 1 else ""
     kept = [p for p in loop.split(",") if p.partition("=")[0] in OWN_LOOP]
@@ -146,7 +148,7 @@ def drive_in(records: Sequence[Record]) -> dict[str, str]:
     periods = [period for r in records if (period := row_period(r)) > 0.0]
     if (
         periods and min(periods) <= USUAL_TIME
-    ):  # A slower record may have been kept more rarely than the loop ran.
+    ):  # A slower record may have fewer rows than the loop has samples.
         out["sample_time"] = f"{min(periods):.3g}"
     counts = [counts_of(r) for r in records]
     if counts and min(counts) > 0:
@@ -160,10 +162,10 @@ def is_linear(records: Sequence[Record]) -> bool:
 
 
 def counts_of(record: Record) -> int:
-    """Counts of the encoder a revolution (of a linear axis, in 2π m), where its step shows; else 0.
+    """Return the encoder counts per revolution (for a linear axis per 2π m) if the step is visible, else 0.
 
-    It must be an encoder's: a power of 2 or some thousands a revolution, or a length of two digits that is no power of
-    ten, which printed digits have as well.
+    They must be plausible for an encoder: a power of 2 or some thousands per revolution, or a length of two digits that
+    is not a power of ten, which printed digits have as well.
     """
     if record.units.get("position") not in ("rad", "m") or "position" not in record.channels:
         return 0
@@ -187,7 +189,7 @@ def counts_of(record: Record) -> int:
 def another_record(
     found: Identification, missing: Sequence[str], files: Sequence[str], model_file: str
 ) -> list[Step]:  # fmt: skip
-    """How to record and identify what is missing."""
+    """Return the steps to record and identify the missing numbers."""
     runs = list(dict.fromkeys(map(experiment_for, missing)))[:2]
     steps = rig_runs(runs, f"To settle {', '.join(missing)}")
     if not files or found.method not in ("axis", "inverse dynamics"):
@@ -198,12 +200,12 @@ def another_record(
 
 
 def quoted(files: Iterable[str]) -> str:
-    """Files as a shell takes them."""
+    """Return the files quoted for a shell."""
     return " ".join(shlex.quote(f) for f in files)
 
 
 def rig_runs(names: Sequence[str], why: str) -> list[Step]:
-    """Records to make."""
+    """Return the records to make."""
     return [
         Step(
             f"{why}, record {MOTIONS[name]} with your drive, or let a rig do it:"

@@ -1,4 +1,4 @@
-"""A report as one HTML file that needs nothing but itself: its filled template."""
+"""Fill the template of a report: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from stickslip.report.plots import tied
 
 
 def filled(template: str, **values: Any) -> str:
-    """The HTML of a template beside this file; a value that it lacks is an error."""
+    """Return the HTML of a template in this folder; a missing value is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(

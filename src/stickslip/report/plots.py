@@ -1,6 +1,6 @@
-"""How figures look, and how they are drawn and saved: small enough to embed, legible at half a page's width.
+"""Draw and save figures: small enough to embed, legible at half a page's width.
 
-matplotlib is imported inside the functions, so that importing this module costs nothing.
+matplotlib is imported inside the functions, so importing this module is fast.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Panel:
     x_limits, y_limits : tuple of float or None
         None fits the data.
     note : str
-        A line above the axes.
+        A text line above the axes.
     x_scale, y_scale : str
         "linear" or "log".
     legend : str
@@ -120,16 +120,16 @@ def envelope(x: Array, y: Array, bins: int = 380) -> tuple[Array, Array]:
 
 
 def scaled(largest: float, unit: str) -> tuple[float, str]:
-    """Factor and unit in which values up to `largest` read well: milli or micro below 0.1 and 1e-4."""
+    """Return factor and unit for values up to `largest`: milli or micro below 0.1 and 1e-4."""
     if not math.isfinite(largest) or largest >= 0.1 or largest == 0.0:
         return 1.0, unit
     return (1e3, f"m{unit}") if largest >= 1e-4 else (1e6, f"µ{unit}")
 
 
 def one_prefix(*largest: float) -> tuple[float, str]:
-    """Factor and prefix in which all values of a figure read well, given the largest of each panel: nothing, m or µ.
+    """Return factor and prefix (none, m or µ) for all values of a figure, from the largest of each panel.
 
-    One figure has one prefix, so that its panels can be compared.
+    One figure has one prefix, so its panels can be compared.
     """
     known = [x for x in largest if math.isfinite(x) and x > 0.0]
     if not known or min(known) >= 0.1 or max(known) >= 10.0:
@@ -138,13 +138,13 @@ def one_prefix(*largest: float) -> tuple[float, str]:
 
 
 def quantity(value: float, unit: str) -> str:
-    """A quantity to three digits in the unit in which it reads well: 3.67 mN·m."""
+    """Return a quantity with three digits in a readable unit: 3.67 mN·m."""
     factor, shown = scaled(abs(value), unit)
     return f"{factor * value:.3g} {shown}"
 
 
 def tied(text: str) -> str:
-    """The text with a number and its unit on one line wherever it is wrapped."""
+    """Return the text with non-breaking spaces between numbers and units."""
     return BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text)
 
 
@@ -213,12 +213,12 @@ def embedded_figure(figure: Any) -> dict[str, Any]:
 
 
 def embedded(file: Path) -> dict[str, Any]:
-    """An SVG, or a PNG of ours, as a data URI, and its size in pixels."""
+    """Return an SVG or PNG as a data URI, and its size in pixels."""
     return embedded_bytes(file.read_bytes(), file.suffix)
 
 
 def embedded_bytes(data: bytes, suffix: str) -> dict[str, Any]:
-    """As `embedded`, of the content of a file whose name ends in `suffix`."""
+    """Return the content of a file whose name ends in `suffix` as a data URI, and its size in pixels."""
     if suffix == ".png":
         kind, (width, height) = "image/png", (72.0 / DPI * x for x in struct.unpack(">II", data[16:24]))
     else:

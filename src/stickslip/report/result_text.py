@@ -1,4 +1,4 @@
-"""An identification in lines of text: the numbers, how far they hold, and the next command."""
+"""Print an identification as lines of text: the numbers, their reliability, and the next command."""
 
 from __future__ import annotations
 
@@ -13,30 +13,32 @@ JUDGED = (
     "force_relative", "inverse_dynamics_relative", "position_", "drive_relative", "sliding_rms", "fall_missing",
     "rms_Nm", "rms_N", "slowest_sliding", "friction_rebuilt_within",
 )  # fmt: skip
-"""Misfits that sentences say, or that say little (the position of an open loop drifts); all are in `as_dict`."""
+"""Misfits that are stated in sentences, or are not informative (the position of an open loop drifts); all are in
+`as_dict`."""
 
 
 def result_lines(found: Identification, answers: Answers) -> list[str]:
-    """Estimates with 95 % intervals, what is not identified and why, how far the torque is off, and what to do now."""
+    """Return estimates with 95 % intervals, numbers that are not identified with reasons, the torque error, and next
+    steps."""
     steps = [measured(s) or f"next: {s.command}" for s in answers.steps]
     return [*numbers_and_trust(found, answers), *steps]
 
 
 def measured(step: Step) -> str:
-    """A step that is a record to make; nothing of another."""
+    """Return the text of a step that is a record to make, else nothing."""
     if step.command and not step.command.startswith(BY_A_RIG):
         return ""
     return f"measure next: {step.what} {step.command}".rstrip()
 
 
 def result_lines_in_python(found: Identification, answers: Answers) -> list[str]:
-    """The same, what to do now in Python where it can be done there."""
+    """Return the same with next steps in Python where possible."""
     steps = [f"next: {s.python}" if s.python else step_in_python(s) for s in answers.steps]
     return [*numbers_and_trust(found, answers), *steps]
 
 
 def step_in_python(step: Step) -> str:
-    """A step that has no function: a record to make, or a command of the shell."""
+    """Return the text of a step without a function: a record to make, or a shell command."""
     if not measured(step):
         return f"next, in a shell: {step.command}"
     command = f"`{step.command}` in a shell" if step.command else ""
@@ -44,7 +46,7 @@ def step_in_python(step: Step) -> str:
 
 
 def numbers_and_trust(found: Identification, answers: Answers) -> list[str]:
-    """What was found, in lines."""
+    """Return the results as lines."""
     law = f": law {found.model.law.name!r}" if found.model else ""
     out = [f"{found.method.replace('_', ' ')}{law}", ""]
     width = max([16, *(len(e.name) + 2 for e in (*found.estimates, *found.held))])
@@ -65,7 +67,7 @@ def numbers_and_trust(found: Identification, answers: Answers) -> list[str]:
 
 
 def interval_text(e: Estimate) -> str:
-    """The 95 % interval."""
+    """Return the 95 % interval as text."""
     if math.isnan(e.lower) or math.isnan(e.upper):
         return "[unknown]"
     return "[{}, {}]".format(*ends(e.value, e.lower, e.upper, ".5g"))

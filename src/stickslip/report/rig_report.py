@@ -1,4 +1,4 @@
-"""The report of experiments on rigs (`stickslip study thesis-rig`): statements, figures, ablation and seeds."""
+"""Write the report of experiments on rigs (`stickslip study thesis-rig`): statements, figures, ablation and seeds."""
 
 from __future__ import annotations
 
@@ -69,13 +69,13 @@ KINDS = {"FF": "feedforward", "FB": "feedback", "": "others"}
 
 
 def labelled(name: str) -> str:
-    """A controller as the legend names it: its law, and the low-pass on the velocity that it sees."""
+    """Return the label of a controller: its law, and the low-pass on its velocity."""
     law = name.removeprefix("FF-").removeprefix("FB-")
     return "gms, 10 Hz filter" if law == "gms10" else law
 
 
 def worded(name: str) -> str:
-    """A controller in words: its law and how it compensates."""
+    """Return the description of a controller: its law and structure."""
     kind = KINDS.get(name[:2], "") if "-" in name else ""
     return f"{labelled(name)} {kind}".strip()
 
@@ -108,7 +108,7 @@ def _panel(one: Experiment, runs: Mapping[str, Run], note: str) -> Panel:
 
 
 def verdict_table(judged: Sequence[Judged]) -> list[dict[str, Any]]:
-    """One row a statement."""
+    """Return one row per statement."""
     return [
         {
             "id": j.claim.id, "section": j.claim.section, "figures": ", ".join(j.claim.figures), "text": j.claim.text,
@@ -120,7 +120,7 @@ def verdict_table(judged: Sequence[Judged]) -> list[dict[str, Any]]:
 
 
 def _ablation(view: ExperimentView) -> list[dict[str, Any]]:
-    """The chosen metrics as the machines are, and without each imperfection."""
+    """Return the selected metrics with all imperfections, and without each one."""
     rows: list[dict[str, Any]] = []
     for name in [v for v in view.varied() if not v.startswith("seed ")]:
         cells: list[str] = []
@@ -145,7 +145,7 @@ def _tally(judged: Sequence[Judged]) -> Iterator[dict[str, Any]]:
 
 
 def best_pairs(view: ExperimentView) -> list[tuple[float, float]]:
-    """RMS error of the best linear controller and of the best compensator of every experiment that has both."""
+    """Return the RMS errors of the best linear controller and the best compensator of every experiment with both."""
     pairs: list[tuple[float, float]] = []
     for one in view.experiments.values():
         errors: dict[bool, list[float]] = {False: [], True: []}
@@ -158,7 +158,7 @@ def best_pairs(view: ExperimentView) -> list[tuple[float, float]]:
 
 
 def write_rig_report(result: StudyResult) -> Path:
-    """Draw the figures and write ``report.html``; returns it.
+    """Draw the figures and write ``report.html``; return its path.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Torque, measured and of the model, where an axis slides for certain: what an identification rests on."""
+"""Measured and model torque in gross sliding, the basis of an identification."""
 
 from __future__ import annotations
 
@@ -21,36 +21,36 @@ from stickslip.simulation.recorded_input.simulation import Mechanics
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 WORSE = 1.05
-"""Times plain least squares' force error, from which on a model's counts as larger."""
+"""Multiple of the force error of plain least squares above which a model's counts as larger."""
 SMALL = 0.01
-"""Of the torque where the axis slides: a model that misses less is not beaten by another."""
+"""Share of the sliding torque: a model with a smaller misfit is not considered worse than another."""
 
 POINTS = 4000
-"""Rows of a record that are looked at, at most: every second, third ... of more."""
+"""Most rows of a record; longer records are thinned to every second, third, ... row."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sliding:
-    """Torque over time and velocity, measured and of the model.
+    """Measured and model torque over time and velocity.
 
     Attributes
     ----------
     time, velocity, position : array, shape (n,)
         s, rad/s (m/s), rad (m).
     measured, model : array, shape (n,)
-        The torque that acted, and that of the model with what friction's drift and a load's swing add to it, N·m (N).
+        Applied torque, and that of the model with the effects of friction drift and load oscillation, N·m (N).
     inertial : array, shape (n,)
-        What of the model's accelerates, lifts, drifts and swings: all but friction and the constant torque, N·m (N).
+        Model torque without friction and constant torque: acceleration, gravity, drift and oscillation, N·m (N).
     record : array of int, shape (n,)
-        Which record a row belongs to.
+        Record of each row.
     certain : bool
-        Whether these are rows of gross sliding; else all of the inverse dynamics'.
+        Whether these are rows of gross sliding, else all rows of the inverse dynamics.
     share : float
-        Part of the records that they are.
+        Share of the records.
     whole : tuple of (array, array)
-        Time and torque that acted of every record, standstills and reversals included.
+        Times and applied torques of every record, including standstills and reversals.
     plain : float
-        Root mean square of what plain least squares leaves in these rows, N·m (N); not a number where not asked.
+        RMS residual of plain least squares in these rows, N·m (N); NaN if not computed.
     """
 
     time: Array
@@ -67,23 +67,23 @@ class Sliding:
 
     @property
     def residual(self) -> Array:
-        """Model less measured, N·m (N)."""
+        """Model minus measured, N·m (N)."""
         return self.model - self.measured
 
     @property
     def rms(self) -> float:
-        """Root mean square of what the model leaves, N·m (N)."""
+        """RMS residual of the model, N·m (N)."""
         return float(np.sqrt(np.mean(self.residual**2)))
 
     @property
     def relative(self) -> float:
-        """The same over that of the torque."""
+        """RMS residual relative to the RMS torque."""
         return self.rms / max(float(np.sqrt(np.mean(self.measured**2))), 1e-300)
 
 
-@lru_cache(maxsize=1)  # the head, its pictures and the command line ask for the same
+@lru_cache(maxsize=1)  # used by the report's top, its pictures and the command line
 def sliding_of(found: Identification) -> Sliding | None:
-    """Torque in gross sliding; None where that was not looked at, or the law says no torque."""
+    """Return the torque in gross sliding; None if it was not evaluated or the law gives no torque."""
     posterior, mechanics = found.details.get("sliding"), found.details.get("mechanics")
     if not isinstance(posterior, SlidingPosterior) or not isinstance(mechanics, Mechanics):
         return None
@@ -109,12 +109,12 @@ def sliding_of(found: Identification) -> Sliding | None:
 
 
 def _thinned(places: Any) -> Any:
-    """At most `POINTS` of some places."""
+    """Thin indices to at most `POINTS`."""
     return places[:: max(1, math.ceil(places.size / POINTS))]
 
 
 def left_by_plain(posterior: SlidingPosterior, places: Any, inverse: Any) -> float:
-    """RMS of what the plain inverse dynamics leaves of the torque in those rows, N·m (N)."""
+    """Return the RMS residual of the plain inverse dynamics in those rows, N·m (N)."""
     if not isinstance(inverse, InverseDynamics):
         return math.nan
     rows, own = posterior.rows, inverse.numbers()
@@ -126,7 +126,7 @@ def left_by_plain(posterior: SlidingPosterior, places: Any, inverse: Any) -> flo
 
 
 def acted(block: Block, skew: float) -> tuple[Array, Array]:
-    """Time and torque that acted, of a whole record through the same window."""
+    """Return times and applied torque of a whole record, seen through the same window."""
     weights = window_weights(block.half, block.record.period, (0,), skew)
     edge = weights.shape[1] // 2
     padded = np.pad(block.record.drive, edge, mode="edge")
@@ -134,7 +134,7 @@ def acted(block: Block, skew: float) -> tuple[Array, Array]:
 
 
 def over_all_rows(found: Identification) -> Sliding | None:
-    """The same over all rows of the inverse dynamics, where sliding was not looked at on its own."""
+    """Return the same for all rows of the inverse dynamics, if sliding was not evaluated separately."""
     inverse, mechanics = found.details.get("inverse"), found.details.get("mechanics")
     if not isinstance(inverse, InverseDynamics):
         return None
@@ -167,7 +167,7 @@ def beaten(sliding: Sliding) -> bool:
 
 
 def beside_held_inertia(found: Identification, unit: str) -> str:
-    """That an inertia that was given, and not fitted, may be why the model is beaten; empty where it was fitted."""
+    """Return a note that a given inertia may be the reason for a worse model; empty if it was fitted."""
     mechanics, inverse = found.details.get("mechanics"), found.details.get("inverse")
     fitted = any(e.name == "inertia" for e in found.estimates)
     if fitted or not isinstance(mechanics, Mechanics) or not isinstance(inverse, InverseDynamics):

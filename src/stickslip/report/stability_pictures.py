@@ -1,4 +1,4 @@
-"""The map of stability: gain against sample time, and gain against the filter's corner."""
+"""Draw the map of stability: gain against sample time, and gain against the filter's corner."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ AREAS = {
 
 
 def picture_of_stability(found: Stability) -> tuple[str, str, Sequence[Panel], float]:
-    """Where the stiffest compensator's loop is stable, rings or creeps away."""
+    """Return the picture of the regions in which the stiffest compensator's loop is stable, rings or creeps away."""
     name, drive = found.time_map.name, found.drive
     now = Curve(np.array([1e3 * drive.sample_time]), np.zeros(1), "this drive", NOW, "vertical")
     advice = found.recommended[name]
@@ -48,7 +48,7 @@ def picture_of_stability(found: Stability) -> tuple[str, str, Sequence[Panel], f
 
 
 def picture_of_controller(found: ControllerStability) -> tuple[str, str, Sequence[Panel], float]:
-    """The transfer function of a controller made of control laws."""
+    """Return the picture of the transfer function of a controller made of control laws."""
     f = found.frequency
     ends = (float(f[0]), float(f[-1]))
     size, turn = np.abs(found.response), np.degrees(np.unwrap(np.angle(found.response)))
@@ -65,7 +65,7 @@ def picture_of_controller(found: ControllerStability) -> tuple[str, str, Sequenc
 
 
 def picture_of_confirmed(found: Confirmed) -> tuple[str, str, Sequence[Panel], float]:
-    """What the poles say as areas, what the virtual rig does as points."""
+    """Return the picture with predictions by poles as areas and the virtual rig's results as points."""
     panels: list[Panel] = []
     for region in found.maps:
         points = found.of(region.name)
@@ -81,12 +81,12 @@ def picture_of_confirmed(found: Confirmed) -> tuple[str, str, Sequence[Panel], f
             (float(FINE[0]), 1.05 * float(FINE[-1])), (float(FINE_GAINS[0]), float(FINE_GAINS[-1])), region.name, "log",
         ))  # fmt: skip
     agreed = sum(p.agrees for p in found.points)
-    message = f"{agreed} of {len(found.points)} settings do on the virtual rig what the poles say"
+    message = f"{agreed} of {len(found.points)} settings behave on the virtual rig as the poles predict"
     return f"Feedback at rest on {found.machine}", message, panels, 1.5
 
 
 def _areas(x: Array, region: Map, gains: Array = GAINS) -> list[Curve]:
-    """One area for each kind of end, overlapping by nothing."""
+    """Return one area for each kind of result, without overlap."""
     stable = -region.growth / np.maximum(np.abs(region.growth), 1.0)
     creeps = np.where((region.growth > 0.0) & (region.frequency < SLOW), 1.0, -1.0)
     rings = np.where((region.growth > 0.0) & (region.frequency >= SLOW), 1.0, -1.0)
@@ -101,10 +101,10 @@ def _one(x: Array) -> Curve:
 def _message(found: Stability, name: str) -> str:
     alone, advice = found.linear.at_one, found.recommended[name]
     static = next(m.static for m in found.margins if m.name == name)
-    first = f"no stiffness is left from gain {static:.2f} on; "
+    first = f"the stiffness is negative above gain {static:.2f}; "
     if advice:
         sieve = f"a filter of {advice.filter_hz:g} Hz" if advice.filter_hz else "no filter"
         return f"{first}safe: gain {advice.gain:g} with {sieve}"
     if not alone.stable:
         return f"{first}the linear controller alone oscillates ({alone.growth:+.0f}/s at {alone.frequency:.0f} Hz)"
-    return f"{first}nothing tried keeps its margins"
+    return f"{first}no tested setting keeps its margins"

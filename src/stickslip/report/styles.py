@@ -1,7 +1,7 @@
-"""How lines look: a controller or law has one colour and one mark, in all figures of studies and sweeps.
+"""Styles of lines: a controller or law has one colour and one mark in all figures of studies and sweeps.
 
-Lines of controllers are whole, never dashed: dashes of a line that oscillates are noise. Marks at a few places
-distinguish lines in print without colour, and show lines that lie on each other.
+Lines of controllers are solid, because dashes of an oscillating line look like noise. Marks at a few places distinguish
+lines in print without colour, and reveal lines on top of each other.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 MARKS = "osD^vP>X<*ph"
-"""The marks; the place of a mark here says where along its line it stands, so that lines on each other show both."""
+"""The marks; their index determines the position along the line, so marks of coinciding lines do not overlap."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Style:
 
 REFERENCE = Style("#000000", (0, (1, 1.5)), 1.3)
 LAST = Style("#777777", width=0.6)
-"""Of names beyond a hundred."""
+"""For names beyond a hundred."""
 LAWS = {
     "coulomb": Style("#E69F00", width=0.9, mark="o"),
     "stribeck": Style("#56B4E9", width=0.9, mark="s"),
@@ -52,15 +52,15 @@ LINEAR = {
     "PR": Style("#D55E00", width=0.9, mark=">"),
 }
 SPARE = ("#D55E00", "#0072B2", "#56B4E9", "#009E73", "#E69F00", "#CC79A7")
-"""The colours of other names, in the order in which they are taken."""
+"""Colours of other names, in order of use."""
 SPARE_MARKS = "P<X*hposD^v>"
 
 
 def styles_of(names: Sequence[str]) -> dict[str, Style]:
-    """A style for every controller of a study, no two the same.
+    """Return a style for every controller of a study, all different.
 
-    A law's colour and mark follow its name wherever it stands, hollow for feedback (``FB-``). The other names take the
-    colours in turn, first those that no known name has, never a linear controller's, beside which all are drawn.
+    A law's colour and mark follow from its name, hollow for feedback (``FB-``). Other names get colours in turn, first
+    those of no known name, never those of a linear controller, which is in every figure.
     """
     styles: dict[str, Style] = {}
     for name in names:
@@ -71,7 +71,7 @@ def styles_of(names: Sequence[str]) -> dict[str, Style]:
     colours = sorted((c for c in SPARE if c not in linear), key=lambda colour: colour in taken)
     count = len(SPARE_MARKS)
     looks = itertools.product((False, True), range(count), enumerate(colours))
-    # Names beside each other differ in colour and in mark: five steps on lead through all marks.
+    # Adjacent names differ in colour and mark: steps of five visit all marks.
     spares = (
         Style(colour, width=0.9, mark=SPARE_MARKS[(place + 5 * turn) % count], hollow=hollow)
         for hollow, turn, (place, colour) in looks
@@ -83,12 +83,12 @@ def styles_of(names: Sequence[str]) -> dict[str, Style]:
 
 
 def style_of(name: str, others: Sequence[str] = ()) -> Style:
-    """The style of a controller or law among others, by `styles_of`."""
+    """Return the style of a controller or law among others, by `styles_of`."""
     return styles_of(list(dict.fromkeys([*others, name])))[name]
 
 
 def _known_style(name: str) -> Style | None:
-    """Of a linear controller, or of the law that a name ends with."""
+    """Return the style of a linear controller, or of the law at the end of a name."""
     if name in LINEAR:
         return LINEAR[name]
     kind, _, law = name.rpartition("-")

@@ -1,4 +1,4 @@
-"""Pictures of a sweep: which controller for how much uncertainty, percentiles, what matters most, which gain."""
+"""Draw a sweep: best controller by uncertainty, percentiles, most important parameter, best gain."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from stickslip.sweep.tune import Tuned, front
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LEVELS = 13
 HIGH = 95.0
-"""The percentile that a design is judged by."""
+"""The percentile for evaluating a design."""
 KINDS = ("percentiles", "gain", "uncertainty", "tornado")
-"""What the names of the figures begin with."""
+"""Prefix of the figures' names."""
 BAND = Style("#0072B2", "-", 4.0)
 MEDIAN = Style("#000000", "-", 1.0)
 ALL = Style("#000000", "-", 0.8)
@@ -33,8 +33,8 @@ LOWER, HIGHER = Style("#0072B2", "-", 4.0), Style("#E69F00", "-", 4.0)
 
 
 def draw(folder: Path, sweep: Sweep) -> list[Path]:
-    """Draw what the sweep's cases allow into ``figures/`` of its folder; those of an earlier run give way. Returns the
-    PNG files."""
+    """Draw the possible figures of a sweep into ``figures/`` of its folder, replacing those of an earlier run; return
+    the PNG files."""
     for kind in KINDS:
         for old in (folder / "figures").glob(f"{kind}-*"):
             old.unlink()
@@ -60,7 +60,7 @@ def _sentence(words: str) -> str:
 
 
 def _columns(folder: Path, sweep: Sweep, run: PlannedRun) -> tuple[list[Array], Array]:
-    """What was drawn, and the sweep's first metric."""
+    """Return the drawn numbers and the sweep's first metric."""
     names = [*sweep.drawn.names, sweep.metrics[0]]
     found = read(folder, sweep, run, names)
     return [found[name] for name in sweep.drawn.names], found[sweep.metrics[0]]
@@ -75,7 +75,7 @@ def _saved(stem: Path, title: str, message: str, panels: list[Panel], height: fl
 
 
 def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Path | None:
-    """Percentiles over the uncertainty; None where the cases are too few for one."""
+    """Draw percentiles over the uncertainty; None with too few cases."""
     what, unit = metric_named(sweep.metrics[0])
     data: dict[str, tuple[Array, Array]] = {}
     for run in runs:
@@ -105,7 +105,7 @@ def _uncertainty(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun])
 
 
 def _choice(lines: dict[str, Array], compensated: list[str], percent: float) -> str:
-    """Which controller to choose, in words: of all of them, and of those that compensate."""
+    """Return the controller to choose as text: of all, and of the compensators."""
 
     def best(names: list[str]) -> str:
         each = {i: min(names, key=lambda n: _or_inf(lines[n][i])) for i in known}
@@ -181,7 +181,8 @@ def _tornado(stem: Path, folder: Path, sweep: Sweep, run: PlannedRun) -> Path:
     names = sweep.varied(run)
     columns = [drawn[i] for i in sorted(sweep.places(run).values())]
     if sweep.drawn.nested:
-        # Within the range that its case drew; else its ends would stand for much uncertainty in all of the others.
+        # Relative to the range of its case; otherwise its ends would represent large uncertainty of all other
+        # parameters.
         middles = [0.5 * (s.low + s.high) for s in sweep.drawn.spreads if s.name in names]
         columns = [(c - m) / drawn[-1] for c, m in zip(columns, middles)]
     pairs = influences(columns, values)
@@ -198,7 +199,7 @@ def _tornado(stem: Path, folder: Path, sweep: Sweep, run: PlannedRun) -> Path:
     curves.append(Curve(np.array([factor * middle]), np.zeros(1), "all cases", ALL, "vertical"))
     words = [number_named(run, name)[0] for name in names]
     message = (
-        f"{run.controller}: median with one parameter in its lowest or highest tenth, the others anywhere; "
+        f"{run.controller}: median with one parameter in its lowest or highest tenth and the others anywhere; "
         f"{words[order[0]]} matters most"
     )
     panel = Panel(curves, "", f"median {what} ({shown})", y_names=[words[i] for i in order])
@@ -235,7 +236,7 @@ def _gains(stem: Path, folder: Path, sweep: Sweep, runs: list[PlannedRun]) -> Pa
 
 
 def trade_off(stem: Path, sweep: Sweep, tuned: Tuned) -> Path:
-    """Draw the first two metrics of every setting tried, and those that no other beats. Returns the PNG file."""
+    """Draw the first two metrics of every setting tried, and the Pareto front; return the PNG file."""
     (what, unit), (price, price_unit) = (metric_named(name) for name in sweep.metrics[:2])
     scores = tuned.scores[np.all(np.isfinite(tuned.scores), axis=1)]
     usual = [float(np.percentile(scores[:, i], 90)) for i in (0, 1)]

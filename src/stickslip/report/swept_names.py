@@ -1,4 +1,4 @@
-"""The metrics and numbers of a sweep as the field writes them: symbols, words and units."""
+"""Symbols, names and units of the metrics and numbers of a sweep."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ CONTROLLER = {
 GREEK = ("alpha", "beta", "gamma", "delta", "kappa", "lambda", "phi", "sigma", "tau", "theta")
 SYMBOL = re.compile(rf"([A-Za-z]|{'|'.join(GREEK)})(?:_([A-Za-z0-9,]+))?")
 BELIEVED = {"law": ", model", "reference": ", reference"}
-"""What is added to the names of numbers that are not the machine's."""
+"""Suffixes of the names of numbers that are not the machine's."""
 
 
 def metric_named(metric: str) -> tuple[str, str]:
-    """A metric in words, and its unit."""
+    """Return the name of a metric, and its unit."""
     for ending, unit in UNITS.items():
         if metric.endswith(f"_{ending}"):
             short = metric.removesuffix(f"_{ending}")
@@ -40,13 +40,13 @@ def metric_named(metric: str) -> tuple[str, str]:
 
 
 def number_named(run: PlannedRun, name: str) -> tuple[str, str]:
-    """A number of a run by its symbol or in words, and its unit, "" without one.
+    """Return symbol or name of a number of a run, and its unit, "" without one.
 
     Parameters
     ----------
     run : PlannedRun
     name : str
-        As a sweep's file names it: ``friction.fs``, ``controller.bandwidth_hz``, ``friction.k[0]``.
+        As in a sweep's file: ``friction.fs``, ``controller.bandwidth_hz``, ``friction.k[0]``.
     """
     family, rest, element = parts(name)
     place = "" if element is None else f", element {element + 1}"
@@ -62,7 +62,7 @@ def number_named(run: PlannedRun, name: str) -> tuple[str, str]:
 
 
 def symbol(written: str) -> str:
-    """A law's symbol, ``sigma_0``, as a figure typesets it."""
+    """Return a law's symbol, such as ``sigma_0``, typeset for a figure."""
     match = SYMBOL.fullmatch(written)
     if match is None:
         return written.replace("$", "")
@@ -71,12 +71,12 @@ def symbol(written: str) -> str:
 
 
 def _fields(run: PlannedRun, family: str) -> tuple[Field, ...]:
-    """The described numbers of a family."""
+    """Return the described numbers of a family."""
     if family == "friction":
         return tuple(run.axis.friction.law.fields)
     if family == "law" and run.control.is_short and run.control.compensator:
         return tuple(run.control.compensator.model.law.fields)
     if family == "reference":
         return tuple(run.motion.kind.fields)
-    # Of a controller's laws the symbols are one law's own: the whole name says whose a number is.
+    # Symbols of a controller's laws are ambiguous: the whole name identifies the law.
     return ()

@@ -1,4 +1,4 @@
-"""Pictures of the torque, measured and of the model: over time, over velocity, and what is left."""
+"""Draw measured and model torque over time and velocity, and the residual."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ from stickslip.report.sliding_torque import Sliding
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 PART, BEGINS = 8, 40
-"""The telling stretch is one part in 8 of its record; as many are looked at."""
+"""The most informative segment is an eighth of its record; eight are compared."""
 CLOUD = 900
-"""Points of a picture over velocity."""
+"""Most points of a picture over velocity."""
 BINS, FEWEST = 24, 8
-"""Of speed, for the medians beside the curve; rows that one needs."""
+"""Bins of speed for the medians at the curve, and fewest rows of a bin."""
 GAP = 3.0
-"""Usual distances between rows, beyond which a line is not drawn on."""
+"""Multiple of the usual row distance above which a line is interrupted."""
 
 
 def units(motion: str) -> tuple[str, str, str]:
-    """Of torque, speed and way."""
+    """Return the units of torque, speed and position."""
     return ("N", "m/s", "m") if motion == "linear" else ("N·m", "rad/s", "rad")
 
 
 def stretch(sliding: Sliding, motion: str) -> Picture:
-    """Measured and model over the stretch of the first record that moves both ways and strains the most."""
+    """Draw measured and model torque in the segment of the first record with motion in both directions and the largest
+    torque."""
     time, torque = sliding.whole[0]
     own = sliding.record == 0
     first, last = telling(sliding, time, torque)
@@ -43,17 +44,17 @@ def stretch(sliding: Sliding, motion: str) -> Picture:
 
 
 def whole_record(sliding: Sliding, motion: str, number: int = 0, name: str = "") -> Picture:
-    """The same over a whole record."""
+    """Draw the same for a whole record."""
     own = sliding.record == number
     which = f" ({name})" if name else ""
     return over_time(
-        f"torque-whole-{number + 1}", f"Torque, measured and of the model: the whole record{which}", sliding, motion,
+        f"torque-whole-{number + 1}", f"Measured and model torque: the whole record{which}", sliding, motion,
         sliding.whole[number], (sliding.time[own], sliding.model[own]),
     )  # fmt: skip
 
 
 def telling(sliding: Sliding, time: Array, torque: Array) -> tuple[float, float]:
-    """Begin and end of that stretch, s."""
+    """Return start and end of that segment, s."""
     length = float(time[-1] - time[0]) / PART
     own = sliding.record == 0
     at, side = sliding.time[own], np.sign(sliding.velocity[own])
@@ -72,11 +73,11 @@ def telling(sliding: Sliding, time: Array, torque: Array) -> tuple[float, float]
 def over_time(
     name: str, title: str, sliding: Sliding, motion: str, measured: tuple[Array, Array], model: tuple[Array, Array]
 ) -> Picture:  # fmt: skip
-    """Both lines; the model's only where it says a torque."""
+    """Draw both lines; the model's only where it gives a torque."""
     unit = units(motion)[0]
     off = f"{100.0 * sliding.relative:.3g} % ({quantity(sliding.rms, unit)} RMS) off"
     message = (
-        f"The model is {off} in gross sliding; its line stops at rest and around reversals."
+        f"The model is {off} in gross sliding; its line is interrupted at rest and around reversals."
         if sliding.certain
         else f"The model is {off}, standstills and reversals included."
     )
@@ -88,7 +89,7 @@ def over_time(
 
 
 def with_gaps(time: Array, values: Array) -> tuple[Array, Array]:
-    """Thinned, with a missing value wherever rows are missing."""
+    """Return thinned values, with NaN where rows are missing."""
     if time.size < 3:
         return time, values
     steps = np.diff(time)
@@ -100,7 +101,7 @@ def with_gaps(time: Array, values: Array) -> tuple[Array, Array]:
 
 
 def over_velocity(sliding: Sliding, found: Identification, motion: str) -> Picture | None:
-    """The torque less what accelerates over the velocity, with the law's curve through it."""
+    """Draw torque minus inertia torque over velocity, with the law's curve."""
     model, mechanics = found.model, found.details.get("mechanics")
     if model is None or model.law.steady is None or mechanics is None:
         return None
@@ -116,15 +117,15 @@ def over_velocity(sliding: Sliding, found: Identification, motion: str) -> Pictu
     spread = quantity(sliding.rms, torque)
     lifts, less = (" and lifts", " and gravity") if mechanics.gravity else ("", "")
     return Picture(
-        "torque-velocity", f"{word.capitalize()} over velocity, without what accelerates{lifts}",
-        f"Measured {word} less {mass} times acceleration{less} lies {spread} RMS off the law's curve.",
+        "torque-velocity", f"{word.capitalize()} minus inertia {word}{lifts} over velocity",
+        f"Measured {word} minus {mass} times acceleration{less} deviates by {spread} RMS from the law's curve.",
         f"velocity ({speed})", f"{word} less {mass} part ({torque})",
         (Trace("model", np.insert(v, cuts, np.nan), np.insert(curve, cuts, np.nan)), Trace("measured", x, y, "cloud")),
     )  # fmt: skip
 
 
 def sides_of(velocity: Array) -> list[tuple[float, float]]:
-    """Least and greatest velocity in each direction that was moved in."""
+    """Return the smallest and largest speed in each direction of motion."""
     out: list[tuple[float, float]] = []
     for side in (-1.0, 1.0):
         speed = side * velocity[side * velocity > 0.0]
@@ -134,7 +135,7 @@ def sides_of(velocity: Array) -> list[tuple[float, float]]:
 
 
 def friction_points(sliding: Sliding, offset: float) -> list[tuple[Array, Array]]:
-    """Medians of the friction torque over bins of speed, for motion in the positive and the negative direction."""
+    """Return medians of the friction torque over bins of speed, for positive and negative direction."""
     top = float(np.max(np.abs(sliding.velocity)))
     slow = max(float(np.min(np.abs(sliding.velocity))), 1e-3 * top)
     edges = np.geomspace(slow, top * (1.0 + 1e-9), BINS + 1)

@@ -1,8 +1,7 @@
-"""Where records come from: one file a kind of rig. `RIGS` names them; `stickslip.rigs.kinds.rig_kind` looks them up.
+"""Sources of records: one file per kind of rig. `RIGS` lists them; `stickslip.rigs.kinds.rig_kind` looks them up.
 
-To add a kind, write its file (`stickslip.rigs.rig` says what it must do) and add its name to this tuple; a rig that
-should not enter the package is offered by the entry point ``stickslip.rigs``. Compiled loops live in files whose name
-begins with an underscore: the cache of compiled code watches those.
+To add a kind, write its file (`stickslip.rigs.rig` defines the interface) and add its name to this tuple; a rig outside
+the package is registered by the entry point ``stickslip.rigs``.
 """
 
 RIGS: tuple[str, ...] = ("virtual", "replay", "ds402")

@@ -1,7 +1,7 @@
 """Time budget of the calls that the loop waits for, and the stop when a call exceeds it.
 
-A controller in Python or a rig may be slightly delayed now and then. If it falls further behind, or does not return,
-its last torque stays on the axis. The delay is accumulated, and the loop stops when it exceeds the budget. A thread
+A Python controller or a rig may be slightly delayed now and then. If it falls further behind, or does not return, its
+last torque stays on the axis. The delay is accumulated, and the loop stops when it exceeds the budget. A thread
 watches the running calls, and stops the rig if a call does not return.
 """
 
@@ -16,33 +16,33 @@ from typing import ParamSpec, TypeVar
 from stickslip.errors import RigError
 
 BUDGET = 0.1
-"""s, by which a controller may be behind if nothing else is said"""
+"""Default delay that a controller may accumulate, s"""
 FIRST = 10.0
-"""s, that the first call may take where no torque stands: it imports, compiles and reserves memory"""
+"""Limit for the first call, s, while no torque is applied: it imports, compiles and allocates memory"""
 LOOKS = 5
-"""Times that the thread looks within the budget"""
+"""Number of checks of the thread within the budget"""
 
 P = ParamSpec("P")
 Result = TypeVar("Result")
 Complaint = Callable[[float], RigError]
-"""Makes the error for a call from its duration, s"""
+"""Returns the error for a call from its duration, s"""
 
 
 class Budget:
-    """Makes calls and counts their time.
+    """Makes calls and measures their time.
 
     Parameters
     ----------
     allowed : float
-        What a call may take without falling behind, s.
+        Duration of a call that causes no delay, s.
     budget : float
-        By how much the calls may be behind the clock, s.
+        Largest delay of the calls behind the clock, s.
     complaint : callable
-        The error for a call that is further behind.
+        Returns the error for a call with a larger delay.
     take_over : callable
-        Called with that error by the watching thread, while the call is under way: it stops the rig.
+        Called with that error by the watching thread, while the call is running; it stops the rig.
     lenient : bool
-        The first call may take `FIRST`.
+        Whether the first call may take `FIRST`.
     """
 
     def __init__(
@@ -67,13 +67,13 @@ class Budget:
         Raises
         ------
         RigError
-            If it is further behind than its budget.
+            If its delay exceeds the budget.
         """
         self._since = time.monotonic()
         try:
             found = function(*args, **kwargs)
         finally:
-            with self._lock:  # once the thread has taken over, this waits for the end of its ramp
+            with self._lock:  # after the thread has taken over, this waits for the end of its ramp
                 took = time.monotonic() - self._since
                 self._since = 0.0
                 late = self._behind + took - self._allowed
@@ -84,7 +84,7 @@ class Budget:
         return found
 
     def look(self) -> None:
-        """Stop the rig, once, if the call under way is beyond its budget."""
+        """Stop the rig, once, if the running call exceeds its budget."""
         with self._lock:
             took = time.monotonic() - self._since
             if not self._spent and self._since and self._behind + took - self._allowed > self.budget:
@@ -93,7 +93,7 @@ class Budget:
 
 
 class Watch:
-    """The thread that looks at the calls under way."""
+    """The thread that checks the running calls."""
 
     def __init__(self) -> None:
         self._budgets: list[Budget] = []

@@ -1,4 +1,4 @@
-"""A node of a CANopen bus as whoever configures it sees it (CiA 301): its objects by SDO, its PDOs, its emergencies."""
+"""A node of a CANopen bus for its configuration (CiA 301): objects by SDO, PDOs and emergencies."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     import canopen
 
 STANDARD = [{"can_id": 0, "can_mask": 0, "extended": False}]
-"""python-can's filter that lets 11-bit identifiers alone through"""
+"""python-can's filter that passes only 11-bit identifiers"""
 FORMATS = {1: "<B", 2: "<H", 4: "<I"}
 
 
 class CanopenNode:
-    """The node of that number; `name` is what messages call it.
+    """A node by its number; `name` is used in messages.
 
     Attributes
     ----------
     error : int
-        Code of the last emergency since it was connected, 0: none.
+        Code of the last emergency since the connection, 0: none.
     """
 
     def __init__(self, name: str, number: int) -> None:
@@ -40,7 +40,7 @@ class CanopenNode:
         Raises
         ------
         InputError
-            Without `canopen`, or where the bus cannot be opened.
+            Without `canopen`, or if the bus cannot be opened.
         """
         try:
             import can
@@ -50,7 +50,7 @@ class CanopenNode:
         network = canopen.Network()
         network.NOTIFIER_CYCLE = 0.02
         try:
-            # Identifiers of 29 bits belong to other protocols: cut to 11 bits they would be this node's.
+            # Identifiers of 29 bits belong to other protocols: truncated to 11 bits they could match this node.
             arguments: dict[str, Any] = {"can_filters": STANDARD, **bus}
             network.bus = can.Bus(**arguments)
             network.connect()  # pyright: ignore[reportUnknownMemberType]
@@ -64,35 +64,35 @@ class CanopenNode:
 
     @property
     def network(self) -> canopen.Network:
-        """What it is connected by.
+        """Network of the connection.
 
         Raises
         ------
         RigError
-            If it is not.
+            If it is not connected.
         """
         if self._network is None:
             raise RigError(f"{self.name} is not open; use it in a Loop")
         return self._network
 
     def leave(self) -> canopen.Network | None:
-        """Be no longer connected; returns the network, None where there was none, for the caller to disconnect."""
+        """Release the network and return it, so the caller can disconnect; None if there was none."""
         network, self._network = self._network, None
         return network
 
     def on_emergency(self, _: int, data: bytearray, __: float) -> None:
-        """Keep the code of an emergency; that its cause is gone (code 0) does not undo it."""
+        """Keep the code of an emergency; code 0 (cause removed) does not clear it."""
         self.error = struct.unpack_from("<H", data)[0] or self.error
 
     # ---- its objects -------------------------------------------------------------------------------------------
 
     def read(self, index: int, sub: int = 0) -> int:
-        """An object of the node, unsigned."""
+        """Read an object of the node, unsigned."""
         data = self._sdo("upload", index, sub)
         return int.from_bytes(data, "little")
 
     def write(self, index: int, sub: int, value: int, size: int) -> None:
-        """Set an object of that many bytes."""
+        """Write an object with a given number of bytes."""
         self._sdo("download", index, sub, struct.pack(FORMATS[size], value))
 
     def _sdo(self, verb: str, index: int, sub: int, *data: bytes) -> bytes:
@@ -109,12 +109,12 @@ class CanopenNode:
             raise MessageLost(f"{self.name}: no answer to {verb} of {index:04X}h:{sub} ({error})") from None
 
     def wait_for(self, index: int, good: Callable[[int], bool], complaint: str, seconds: float = 0.5) -> None:
-        """Read an object until its value is good.
+        """Read an object until its value is accepted.
 
         Raises
         ------
         DriveFault
-            With the complaint, where it is not by then.
+            With the given message, if that does not happen in time.
         """
         end = time.monotonic() + seconds
         while not good(self.read(index)):

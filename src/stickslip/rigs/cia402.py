@@ -36,13 +36,13 @@ NEXT = {
 """The controlword that leads from a state towards operation enabled"""
 HOMED, HOMING_ERROR = 1 << 12, 1 << 13  # of the statusword in homing mode
 UNKNOWN_FAULT = 0xFFFF
-"""Where a drive shows a fault and has not said which"""
+"""Code of a fault that the drive does not specify"""
 KEPT = {
     1 << 4: "that its voltage is off",
     1 << 9: "that it is no longer remote: it ignores the controlword",
     1 << 12: "that it no longer follows the target torque",
 }
-"""Bits of the statusword that a drive may lack, but must not lose"""
+"""Bits of the statusword that a drive may never set, but must not clear"""
 
 # ---- what is heard on the bus -----------------------------------------------------------------------------------
 MODE_QUESTION = bytes([0x40, MODE_SHOWN & 0xFF, MODE_SHOWN >> 8, 0, 0, 0, 0, 0])
@@ -51,9 +51,9 @@ ABORT = 0x80  # of SDO
 BUS_OFF = 0x40  # of an error frame, as SocketCAN numbers them
 OPERATIONAL = 5
 DOWNLOADS = (1, 6)
-"""SDO commands that begin to write an object, in one piece or in blocks"""
+"""SDO commands that start to write an object, in one piece or in blocks"""
 NMT = {0x02: "stop", 0x80: "enter pre-operational", 0x81: "reset node", 0x82: "reset communication"}
-"""Commands after which a node exchanges no PDO"""
+"""NMT commands after which a node exchanges no PDOs"""
 
 
 def interference(service: int, data: bytes, node: int) -> str:
@@ -76,10 +76,10 @@ def interference(service: int, data: bytes, node: int) -> str:
 
 
 def state_of(status: int) -> str:
-    """The state that a statusword tells."""
+    """Return the state from a statusword."""
     return next((name for name, (mask, value) in STATES.items() if status & mask == value), f"0x{status:04X}")
 
 
 def signed(value: int) -> int:
-    """32 bits as a signed number."""
+    """Return 32 bits as a signed number."""
     return (value ^ 0x80000000) - 0x80000000

@@ -1,4 +1,4 @@
-"""What a rig says of itself and answers, checked: anybody may write one."""
+"""Check the properties and answers of a rig, because users may write their own."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from stickslip.errors import InputError, MeasurementFault, RigError
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, Rig
 
 FASTEST, SLOWEST = 1e-7, 1e5
-"""s, the shortest and the longest sample time"""
+"""Shortest and longest sample time, s"""
 FIELDS = len(Measurement._fields)
 
 
 def checked(rig: Rig) -> Rig:
-    """The rig, if what it says of itself can be used.
+    """Return the rig if its properties are valid.
 
     Raises
     ------
     InputError
-        That names the property.
+        Names the invalid property.
     """
     kind = type(rig).__name__
     name, sample_time = _told(kind, rig, "name"), _told(kind, rig, "sample_time")
@@ -53,7 +53,7 @@ def _told(kind: str, rig: Rig, what: str) -> Any:
 
 @contextmanager
 def blamed(rig: Rig, doing: str) -> Generator[None]:
-    """Report what a rig raises while it does something, exits included, as its error; errors for users as they are."""
+    """Convert any exception of a rig, exits included, to its error; errors for users stay as they are."""
     try:
         yield
     except (RigError, InputError):
@@ -63,15 +63,15 @@ def blamed(rig: Rig, doing: str) -> Generator[None]:
 
 
 def last_resort(rig: Rig) -> str:
-    """Return what removes the torque if the loop cannot, in words."""
+    """Return a text that names what removes the torque if the loop cannot."""
     watchdog = rig.capabilities.watchdog
     if watchdog is None:
         return "it declares no watchdog: switch its power off"
-    return f"its watchdog takes the torque away within {watchdog.time:g} s ({watchdog.how})"
+    return f"its watchdog removes the torque within {watchdog.time:g} s ({watchdog.how})"
 
 
 def answer(rig: Rig, doing: str, ask: Callable[[], Any]) -> Any:
-    """What a rig answers, as `Measurement` has it.
+    """Return a rig's answer as the numbers of `Measurement`.
 
     Raises
     ------

@@ -1,19 +1,19 @@
 """A drive with the CiA 402 profile over CANopen: cyclic synchronous torque, a SYNC every sample time.
 
-Every sample the loop sends an RPDO (controlword 6040h, target torque 6071h) and a SYNC; at the SYNC the drive takes the
-torque over and latches what its TPDO then says (statusword 6041h, position 6064h, torque 6077h). The measurement is
-so from the instant at which the torque begins to act: one sample of delay, as on any synchronous drive.
+In every sample the loop sends an RPDO (controlword 6040h, target torque 6071h) and a SYNC. At the SYNC the drive
+applies the torque and latches the content of its TPDO (statusword 6041h, position 6064h, torque 6077h). The measurement
+is therefore from the instant at which the torque starts to act: one sample of delay, as on any synchronous drive.
 
-The drive guards itself (CiA 301 and 402): it watches the RPDO (its event timer, 1400h:5) or the heartbeat of this
-process (1016h), and on their absence does what 6007h says, here "disable voltage". Both are sent by the loop itself,
-so that a loop that hangs is missed as one that was killed is.
+The drive has its own watchdog (CiA 301 and 402): it monitors the RPDO (its event timer, 1400h:5) or the heartbeat of
+this process (1016h), and in their absence performs the action of 6007h, here "disable voltage". Both are sent by the
+loop itself, so a loop that hangs is detected like one that was killed.
 
-Another master must not interfere. Its SYNC, its commands (RPDO, NMT) and a restart of the drive are heard on the bus;
-the mode of operation, which no PDO has room for, is asked for by SDO every `MODE_PERIOD`. Each ends the run, as an
+Another master must not interfere. Its SYNC, its commands (RPDO, NMT) and a restart of the drive are detected on the
+bus; the mode of operation, which does not fit into a PDO, is read by SDO every `MODE_PERIOD`. Each ends the run, as an
 emergency does. Frames with identifiers of 29 bits belong to other protocols.
 
-Configuration uses `canopen`; during the run the bus is read in the loop's own thread, since handing frames from
-thread to thread costs more than a sample has. `pip install 'stickslip[canopen]'` brings canopen (MIT) and
+Configuration uses `canopen`; during the run the bus is read in the loop's own thread, because passing frames between
+threads takes longer than a sample. `pip install 'stickslip[canopen]'` brings canopen (MIT) and
 python-can (LGPL).
 """
 
@@ -40,12 +40,12 @@ WATCHDOGS = ("rpdo", "heartbeat", "none")
 OWN_NODE = 127
 """Node number of this process, for its heartbeat"""
 MODE_PERIOD, MODE_ANSWER = 0.02, 1.0
-"""s from one question for the mode of operation to the next, and that an answer may take"""
+"""Period of reading the mode of operation, and timeout of the answer, s"""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What a drive needs to be told, and what to be told about it.
+    """Settings of a drive.
 
     Attributes
     ----------
@@ -53,17 +53,17 @@ class Settings:
         Arguments of python-can's ``can.Bus``: ``interface``, ``channel``, ``bitrate``, ...
     node : int
     limits : Limits
-        A finite position limit demands a drive that was homed.
+        A finite position limit requires a homed drive.
     sample_time : float
         s
     watchdog : {"rpdo", "heartbeat", "none"}
-        What the drive watches: the cyclic torque, the heartbeat of this process, or nothing.
+        What the drive monitors: the cyclic torque, the heartbeat of this process, or nothing.
     watchdog_time : float
-        After which the drive takes the torque away, s; whole ms.
+        Time after which the drive removes the torque, s; whole ms.
     reset_fault : bool
-        Reset a fault that the drive shows when it is opened.
+        Whether to reset a fault that the drive has when it is opened.
     timeout : float
-        How long to wait for the answer to a SYNC, s. The stop starts this long after a lost answer. The limit
+        Timeout of the answer to a SYNC, s. The stop starts this long after a lost answer. The limit
         ``answer_time`` is at least twice as long.
     """
 
@@ -123,7 +123,7 @@ class Ds402:
         Raises
         ------
         InputError
-            Without `canopen`, where the bus cannot be opened, or the drive cannot do what is asked.
+            Without `canopen`, if the bus cannot be opened, or if the drive does not support what is required.
         DriveFault, MessageLost
         """
         self._lost = False
@@ -168,7 +168,7 @@ class Ds402:
         return measured
 
     def pause(self, seconds: float) -> Measurement:
-        """Zero torque for that time, at the sample rate: the drive's watchdog is kept content."""
+        """Send zero torque for that time at the sample rate, which keeps the drive's watchdog satisfied."""
         end = time.monotonic() + seconds
         measured = self.exchange(0.0)
         while time.monotonic() < end:
@@ -177,11 +177,11 @@ class Ds402:
         return measured
 
     def quick_stop(self) -> None:
-        """Tell the drive to stop by itself (605Ah says how); no answer is waited for."""
+        """Send a quick stop (605Ah defines its kind) without waiting for an answer."""
         self._send(cia.QUICK_STOP, 0.0)
 
     def close(self) -> None:
-        """Zero torque, disable the drive, disconnect. A drive that does not answer is told to stop all the same."""
+        """Send zero torque, disable the drive and disconnect, even if the drive does not answer."""
         network = self._node.leave()
         if network is None:
             return
@@ -202,11 +202,11 @@ class Ds402:
     # ---- checking and configuring --------------------------------------------------------------------------------
 
     def _check(self) -> None:
-        """The drive is one, can do cyclic torque, is without fault, and homed where a position is limited."""
+        """Check the profile, cyclic torque mode, absence of faults, and homing if the position is limited."""
         self._node.network.send_message(0, bytes([0x80, self.settings.node]))
         if (kind := self._node.read(cia.DEVICE_TYPE) & 0xFFFF) != cia.PROFILE:
             raise InputError(
-                f"{self.name}: its device type says profile {kind}, not CiA {cia.PROFILE}; check the node"
+                f"{self.name}: its device type is profile {kind}, not CiA {cia.PROFILE}; check the node"
             )
         if not self._node.read(cia.MODES) >> (cia.CYCLIC_TORQUE - 1) & 1:
             raise InputError(f"{self.name}: the drive has no cyclic synchronous torque mode (6502h)")
@@ -226,13 +226,13 @@ class Ds402:
             self._demand_homed()
 
     def _reset(self) -> None:
-        """Reset a fault, where that is asked for; else refuse the drive."""
+        """Reset a fault if requested; otherwise refuse the drive."""
         if cia.state_of(self._node.read(cia.STATUSWORD)) != "fault":
             return
         code = self._node.read(cia.ERROR_CODE)
         if not self.settings.reset_fault:
             raise DriveFault(
-                f"{self.name}: the drive shows fault 0x{code:04X}; remove its cause, or set reset_fault"
+                f"{self.name}: the drive has fault 0x{code:04X}; remove its cause, or set reset_fault"
             )
         self._node.write(cia.CONTROLWORD, 0, 0, 2)
         self._node.write(cia.CONTROLWORD, 0, cia.RESET, 2)
@@ -243,7 +243,7 @@ class Ds402:
         self._node.error = 0
 
     def _demand_homed(self) -> None:
-        """In homing mode the statusword tells whether the position is known."""
+        """Refuse a drive that is not homed, by the statusword in homing mode."""
         self._node.write(cia.MODE, 0, cia.HOMING, 1)
         self._node.wait_for(cia.MODE_SHOWN, lambda mode: mode == cia.HOMING, "it does not enter homing mode")
         status = self._node.read(cia.STATUSWORD)
@@ -253,7 +253,7 @@ class Ds402:
             )
 
     def _configure(self) -> None:
-        """PDOs, the watchdog, and the mode."""
+        """Configure PDOs, watchdog and mode."""
         node = self.settings.node
         self._node.map_pdo(cia.RPDO, cia.RPDO_MAP, 0x200 + node, {cia.CONTROLWORD: 16, cia.TARGET_TORQUE: 16})
         self._node.map_pdo(
@@ -273,17 +273,17 @@ class Ds402:
         self._turned = self._last
 
     def _watch(self, index: int, sub: int, value: int, size: int, wanted: bool) -> None:
-        """Set a watchdog of the drive, or switch off what an earlier session left of it."""
+        """Set a watchdog of the drive, or switch off one of an earlier session."""
         if wanted:
             self._node.write(index, sub, value, size)
             return
-        with contextlib.suppress(InputError):  # a drive need not have the other one
+        with contextlib.suppress(InputError):  # the drive may lack the other one
             self._node.write(index, sub, 0, size)
 
     # ---- cycles --------------------------------------------------------------------------------------------------
 
     def _enable(self) -> Measurement:
-        """Walk the state machine to "operation enabled", a SYNC every sample time."""
+        """Step the state machine to "operation enabled", with a SYNC every sample time."""
         end = time.monotonic() + 1.0
         word, misses = cia.DISABLE, 0
         while True:
@@ -330,7 +330,7 @@ class Ds402:
             self._sent[service, data] += 1
 
     def _is_echo(self, service: int, data: bytes) -> bool:
-        """Whether a frame is one of this process, which some buses hand back."""
+        """Whether a frame is from this process; some buses return them."""
         if not self._sent.get((service, data)):
             return False
         self._echo = True
@@ -340,16 +340,16 @@ class Ds402:
         return True
 
     def _cycle(self, word: int, torque: float) -> tuple[int, Measurement]:
-        """One sample: statusword and measurement."""
+        """Run one sample: return statusword and measurement."""
         network = self._node.network
         bus: Any = network.bus
         try:
-            # Answers that came too late for their own sample are not taken for this one's.
+            # Late answers of earlier samples must not be used for this one.
             while (stale := bus.recv(0)) is not None:
                 self._heed(stale)
             self._send(word, torque)
             sent = time.monotonic_ns()
-            # Once an answer was missed the loop is stopping: its ramp does not wait for what may never come.
+            # After a missed answer the loop is stopping: its ramp does not wait any more.
             patience = 0.5 * self.sample_time if self._lost else self.settings.timeout
             end = sent + int(1e9 * patience)
             answer = None
@@ -361,7 +361,7 @@ class Ds402:
                 answer = self._heed(message)
         except RigError:
             raise
-        except Exception as error:  # python-can's drivers raise their own
+        except Exception as error:  # python-can's drivers raise their own errors
             self._lost = True
             raise MessageLost(f"{self.name}: the bus failed ({error})") from error
         if self._found:
@@ -381,7 +381,7 @@ class Ds402:
         )
 
     def _heed(self, message: Any) -> bytes | None:
-        """Take a frame in; the data of the TPDO, where it is one. What ends the run is kept in `_found`."""
+        """Process a frame; return its data if it is the TPDO. A reason to end the run is stored in `_found`."""
         if message.is_error_frame:
             if message.arbitration_id & cia.BUS_OFF:
                 self._found = self._found or "the bus is off"
@@ -397,9 +397,7 @@ class Ds402:
                     self._echo = False
                     self._sent.clear()
                 return data
-            found = (
-                f"its TPDO has {len(data)} bytes in place of {ANSWER.size}: another master has mapped it anew"
-            )
+            found = f"its TPDO has {len(data)} bytes instead of {ANSWER.size}: another master has changed its mapping"
         elif service == 0x80 + node and len(data) >= 2:
             self._node.on_emergency(0, bytearray(data), 0.0)
             return None
@@ -421,13 +419,13 @@ class Ds402:
         if mode == cia.CYCLIC_TORQUE:
             return ""
         return (
-            f"the mode of operation is {mode} in place of {cia.CYCLIC_TORQUE} (cyclic torque): another master has "
+            f"the mode of operation is {mode} instead of {cia.CYCLIC_TORQUE} (cyclic torque): another master has "
             "changed it"
         )
 
 
 def whole(value: Any) -> Any:
-    """A whole number as such: python-can wants those for ports and bit rates."""
+    """Return integers as int, which python-can requires for ports and bit rates."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
@@ -435,7 +433,7 @@ def whole(value: Any) -> Any:
 
 
 def build(table: Table) -> Ds402:
-    """From ``bus``, ``node``, ``limits``, and what `Settings` has defaults for."""
+    """Build a drive from ``bus``, ``node``, ``limits`` and the optional fields of `Settings`."""
     node = table.number("node", "")
     if not node.is_integer():
         raise table.error("node", "must be a whole number")

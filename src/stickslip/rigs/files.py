@@ -1,4 +1,4 @@
-"""Rigs described in TOML files: ``[rig]`` names the kind and what it needs, ``[rig.limits]`` what it allows.
+"""Read rigs from TOML files: ``[rig]`` has the kind and its settings, ``[rig.limits]`` the limits.
 
 The kind is the name of a registered one, or the path of a file with ``RIG = RigKind(...)``.
 
@@ -27,14 +27,14 @@ from stickslip.rigs.rig import Limits, Rig, RigKind
 
 
 def read_rig(path: str | os.PathLike[str]) -> Rig:
-    """The rig that the TOML file at `path` describes, not yet open.
+    """Return the rig of a TOML file, not yet open.
 
     Raises
     ------
     ConfigError
-        Which key is wrong, and what is allowed.
+        Names the wrong key and the allowed values.
     CodeRefused
-        If its kind is code that nobody has approved.
+        If its kind is code that is not approved.
     """
     with read_toml(Path(path)) as document, document.table("rig") as table:
         name = table.text("kind")

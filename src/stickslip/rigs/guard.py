@@ -1,4 +1,4 @@
-"""The safety of the loop by name: what its compiled sample remembers, and the first reason to stop."""
+"""The safety state of the loop by name, and the first reason to stop."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ from stickslip.rigs.safety import (
 from stickslip.stream import Stream
 
 STATE = Safety._fields.index("state")
-"""Every sample asks for it, and a place takes a quarter of the time that a name does."""
+"""Every sample reads it, and an index takes a quarter of the time of a name."""
 EXCHANGE, CONTROLLER = "exchange", "the controller"
 """Calls that may raise"""
 KNOWN = ("started", "turns", "position", "velocity", "slow_velocity", "error")
-"""What one controller takes over from another: position and velocities, but nothing of its laws"""
+"""State that one controller takes over from another: position and velocities, not the state of its laws"""
 
 
 class Guard:
-    """The safety of the control at work.
+    """Safety of the current control.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Guard:
     ----------
     control : Control
     fault : BaseException or None
-        The first reason to stop that was not seen by the sample itself; at the end what is told of it.
+        The first reason to stop that the sample itself did not detect; at the end the error to report.
     """
 
     def __init__(self, control: Control) -> None:
@@ -65,7 +65,7 @@ class Guard:
         self._name(control)
 
     def _name(self, control: Control) -> None:
-        # Once, so that a sample that goes wrong allocates nothing.
+        # Created once, so a failing sample allocates nothing.
         self.control = control
         self._safety = control.safety.view(SAFETY)[0]
         self._measured = control.measured.view(MEASURED)[0]
@@ -78,11 +78,11 @@ class Guard:
 
     @property
     def torque(self) -> float:
-        """The torque commanded last, N·m."""
+        """The last torque command, N·m."""
         return float(self._safety["torque"])
 
     def take_over(self, control: Control, travel: float) -> None:
-        """Go on from where the last segment left the axis, with another controller."""
+        """Continue with another controller from the state at the end of the last segment."""
         last, known = self.control, self._memory
         control.bounds.view(BOUNDS)["travel"] = min(travel, UNBOUNDED)
         control.measured[:] = last.measured
@@ -98,17 +98,17 @@ class Guard:
             self._safety["state"] = RUNNING
 
     def forget_speed(self) -> None:
-        """The axis may have moved meanwhile: no speed from the last sample to the next."""
+        """Reset the speed between samples, because the axis may have moved meanwhile."""
         self._safety["started"] = self._memory["started"] = 0.0
 
     def pass_time(self, seconds: float) -> None:
-        """A sample went by without a measurement."""
+        """Note a sample without a measurement."""
         self._measured["time"] += seconds
 
     # ---- stopping ------------------------------------------------------------------------------------------
 
     def ask(self, reason: BaseException, source: str = "") -> None:
-        """Begin to stop, unless that is under way; the first reason is reported, with the call that raised it."""
+        """Start to stop, unless already stopping; the first reason is reported, with the call that raised it."""
         s = self._safety
         if s["state"] == STOPPED or s["reason"] != NONE:
             return
@@ -120,7 +120,7 @@ class Guard:
         self._safety["state"], self._safety["torque"] = STOPPED, 0.0
 
     def begin_ramp(self) -> bool:
-        """Begin to take the torque away without a fault; whether there is any."""
+        """Start to ramp the torque down without a fault; return whether there is any."""
         s = self._safety
         if s["torque"] == 0.0 and s["state"] != STOPPING:
             return False
@@ -128,7 +128,7 @@ class Guard:
         return True
 
     def end_ramp(self) -> bool:
-        """Note that the torque is zero, and return whether no fault has occurred meanwhile."""
+        """Note that the torque is zero; return whether no fault has occurred meanwhile."""
         if self._safety["reason"] != NONE:
             self._safety["state"] = STOPPED
             return False
@@ -137,7 +137,7 @@ class Guard:
         return True
 
     def at_last(self, fault: BaseException | None) -> None:
-        """Note what went wrong after the last sample: leaving the loop reports it, after an earlier error."""
+        """Note an error after the last sample; leaving the loop reports it, unless there was an earlier one."""
         if fault is None or fault is self.fault:
             return
         if self.fault is None:
@@ -146,24 +146,24 @@ class Guard:
             self.fault.args = (f"{self.fault}; {fault}",)
 
     def leave_untold(self) -> None:
-        """The fault is raised when the loop is left, unless its block raises."""
+        """Raise the fault when the loop is left, unless its block raises."""
         self._late = True
 
     @property
     def untold(self) -> BaseException | None:
-        """What leaving the loop is to raise: nobody has been told of it."""
+        """The error to raise when the loop is left, if it has not been reported."""
         return self.fault if self._late or isinstance(self.fault, Interrupted) else None
 
     @property
     def ending(self) -> str:
-        """How the run ended, for its record."""
+        """Return how the run ended, for its record."""
         if self.fault is None:
             return "as planned"
         known = isinstance(self.fault, StickslipError)
         return str(self.fault) if known else f"{type(self.fault).__name__}: {self.fault}"
 
     def error(self, rig: str, limits: Limits, stream: Stream) -> BaseException:
-        """What is raised once the torque is zero."""
+        """Return the error to raise when the torque is zero."""
         s = self._safety
         at = float(s["time"])
         if self.fault is None:
@@ -179,7 +179,7 @@ class Guard:
 
 
 def crossed(rig: str, limits: Limits, reason: int, value: float, suspect: int, at: float) -> RigError:
-    """The error for what the guarded sample itself saw: the limit, the `value` that crossed it, why, and when."""
+    """Return the error that the guarded sample detected: the limit, the `value` that crossed it, cause and time."""
     where = f"at t = {at:.3f} s; the torque was ramped to zero"
     name = REASONS[reason]
     if reason == CLOCK:
@@ -200,7 +200,7 @@ def crossed(rig: str, limits: Limits, reason: int, value: float, suspect: int, a
 
 
 def clock_fault(rig: str, step: float, where: str) -> MeasurementFault:
-    """The error for a clock that does not advance as the samples do."""
+    """Return the error for a clock that does not advance with the samples."""
     return MeasurementFault(
         f"{rig}: its time changes by {step:.6g} s {where}; it must increase by the sample time in every sample; "
         "correct the rig's clock"
@@ -212,7 +212,7 @@ SUSPECTED = {
     IGNORED: f"; before, the measured torque did not follow the command: {WIRING}",
     AGAINST: "; before, the axis accelerated against the torque: check signs and delays of position and torque",
 }
-"""What a limit that was crossed may be due to"""
+"""Possible causes of a crossed limit"""
 
 
 def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] | None:
@@ -221,8 +221,8 @@ def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] 
     found = {
         STILL: (
             f"the position has not changed {waited} under {value:.4g} N·m, which must move the axis",
-            "check encoder, brake and end stops; if it may stand still under this torque, set a greater "
-            "standstill_torque in [rig.limits]",
+            "check encoder, brake and end stops; if the axis may stand still under this torque, "
+            "increase standstill_torque in [rig.limits]",
         ),
         FROZEN: (
             f"no reading has changed {waited} while the torque command did",
@@ -245,9 +245,10 @@ def contradiction(limits: Limits, reason: int, value: float) -> tuple[str, str] 
 
 
 def told(rig: str, fault: BaseException, source: str) -> BaseException:
-    """What is raised for an exception that stopped a run: errors of rigs and users as they are, and the user's exits.
+    """Return the error for an exception that stopped a run; errors of rigs and users, and the user's exits, are
+    unchanged.
 
-    A rig that exits (`SystemExit`, `KeyboardInterrupt`) has failed; signals are heard by the loop itself.
+    A rig that exits (`SystemExit`, `KeyboardInterrupt`) has failed; signals are handled by the loop itself.
     """
     if isinstance(fault, (RigError, InputError)) or not (isinstance(fault, Exception) or source == EXCHANGE):
         return fault

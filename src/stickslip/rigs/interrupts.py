@@ -1,12 +1,12 @@
-"""Signals that would end or halt the process, heard by a loop between two samples, so that it ends by its ramp.
+"""Handle signals that would end or halt the process between two samples, so the loop ends with its ramp.
 
-In the main thread Python's own handlers note the signal, and the loop's `Interrupted` tells of it. Python hears signals
-in no other thread, and one that nobody hears ends the process at once. A loop in another thread therefore has the
-system call a compiled handler; when its torque is zero and its record closed, the signal is sent once more, to whom it
-would have gone. All loops of a process hear the same signal.
+In the main thread Python's own handlers note the signal, and the loop's `Interrupted` reports it. Python handles
+signals in no other thread, and an unhandled one ends the process at once. For a loop in another thread the system
+therefore calls a compiled handler; when its torque is zero and its record closed, the signal is sent once more to its
+original handler. All loops of a process get the same signal.
 
-Some signals cannot be handled, therefore only the drive's watchdog removes the torque: SIGKILL and SIGSTOP, which the
-system gives to no program, and those of a crash (`CRASHES`), after which no code can be relied on.
+Some signals cannot be handled, so only the drive's watchdog removes the torque: SIGKILL and SIGSTOP, which the system
+never delivers to a program, and those of a crash (`CRASHES`), after which no code is reliable.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from stickslip.errors import Interrupted
 from stickslip.jit import compiled_notice
 
 ALWAYS = ("SIGINT", "SIGTERM", "SIGBREAK")
-"""Heard whatever the program does with them otherwise"""
+"""Always handled, even if the program has its own handlers"""
 CRASHES = ("SIGSEGV", "SIGBUS", "SIGILL", "SIGFPE")
-"""The instruction that raised one of them would be run again after a handler, and raise it again."""
+"""After a handler the instruction that raised one of them would run again and raise it again."""
 NEVER = ("SIGKILL", "SIGSTOP", *CRASHES, "SIGCHLD", "SIGCONT", "SIGURG", "SIGWINCH")
-"""Not heard: these cannot be, or neither end nor halt the process."""
+"""Not handled: this is impossible, or they neither end nor halt the process."""
 TERMINAL = ("SIGTTIN", "SIGTTOU")
-"""Signals of a background process that uses its terminal. After the first they are ignored, since the same call would
+"""Signals of a background process that uses its terminal. They are ignored after the first, because the same call would
 raise them forever."""
 
 
 class Signals:
-    """Which signal asked for the end; 0 while none did."""
+    """The signal that requested the end; 0 if none."""
 
     def __init__(self) -> None:
         self._hearing = False
@@ -54,7 +54,7 @@ class Signals:
         return int(NOTED[0]) if self._hearing else self._number
 
     def quieten(self) -> None:
-        """Ignore a signal of the terminal (`TERMINAL`) that has come, if the loop is off the main thread."""
+        """Ignore further signals of the terminal (`TERMINAL`) if the loop is not in the main thread."""
         number = self.number
         if not self._before and number in _replaced and number in _numbers(TERMINAL) and number not in _quiet:
             _quiet.add(number)
@@ -62,11 +62,11 @@ class Signals:
 
     @property
     def error(self) -> Interrupted:
-        """What it is told as."""
-        return Interrupted(f"{name_of(self.number)} asked for the end")
+        """Return the error that reports the signal."""
+        return Interrupted(f"{name_of(self.number)} requested the end")
 
     def hear(self, undo: ExitStack) -> None:
-        """Hear them until `undo`. Off the main thread of a system without POSIX signals nothing can be heard."""
+        """Handle signals until `undo`. Outside the main thread this requires POSIX signals."""
         main = threading.current_thread() is threading.main_thread()
         if not main and os.name != "posix":
             return
@@ -80,7 +80,7 @@ class Signals:
         self._hearing = True
 
     def release(self) -> None:
-        """Give the signals back before the end: the loop is held up and looks at none, but its torque is zero."""
+        """Restore the signals before the end: the loop is blocked and checks none, but its torque is zero."""
         if self._hearing and not self._released:
             self._released = True
             if not self._before:
@@ -90,7 +90,7 @@ class Signals:
 
     @contextmanager
     def at_once(self) -> Generator[None]:
-        """In this block a signal interrupts what the main thread does: no torque acts."""
+        """Let a signal interrupt the main thread in this block, in which no torque acts."""
         self._patience = 0
         try:
             yield
@@ -99,7 +99,7 @@ class Signals:
 
     @contextmanager
     def at_the_second(self) -> Generator[None]:
-        """In this block the second signal does so."""
+        """Let the second signal interrupt the main thread in this block."""
         self._patience = 1
         try:
             yield
@@ -107,7 +107,7 @@ class Signals:
             self._patience = math.inf
 
     def interrupt(self, error: BaseException) -> bool:
-        """Raise an error in the main thread, from another, if the loop runs there; whether it does."""
+        """Raise an error in the main thread, from another one, if the loop runs there; return whether it does."""
         if not self._before or not hasattr(signal, "pthread_kill"):
             return False
         self._error = error
@@ -118,11 +118,11 @@ class Signals:
         self._number, self._hearing = int(NOTED[0]), False
 
     def _hear_main(self) -> Any:
-        """Begin in the main thread; returns what ends it."""
+        """Start in the main thread; return the function that ends it."""
         found = {number: signal.getsignal(number) for number in (*_numbers(ALWAYS), *_unless_used())}
         always = _numbers(ALWAYS)
         self._before = {
-            # None is a handler that was not set from Python, and could not be restored.
+            # None means a handler that was not set from Python and cannot be restored.
             n: old
             for n, old in found.items()
             if old is not None and (n in always or (old is signal.SIG_DFL and not _used_by_code(n)))
@@ -137,7 +137,7 @@ class Signals:
         with _changing:
             _loops.discard(id(self))
             if _elsewhere:
-                _take()  # from what was just restored
+                _take()  # from the handler that was just restored
 
     def _note(self, number: int, frame: Any) -> None:
         if self._error is not None:
@@ -154,7 +154,7 @@ class Signals:
             signal.raise_signal(number)
 
     def _hear_elsewhere(self) -> Any:
-        """Begin in another thread; returns what ends it."""
+        """Start in another thread; return the function that ends it."""
         with _changing:
             _elsewhere.add(id(self))
             if len(_elsewhere) == 1:
@@ -165,14 +165,14 @@ class Signals:
 # ---- handlers of the process, for loops off its main thread --------------------------------------------------------
 
 NOTED = np.zeros(1)
-"""The last signal that came while a loop heard; 0: none"""
+"""The last signal that a loop has handled; 0: none"""
 _changing = threading.Lock()
 _loops: set[int] = set()
 _elsewhere: set[int] = set()
 _replaced: dict[int, Any] = {}
-"""What the system called before, as its ``struct sigaction``"""
+"""Previous handlers, as the system's ``struct sigaction``"""
 _quiet: set[int] = set()
-"""Those that are ignored for the rest of the loop"""
+"""Signals that are ignored for the rest of the loop"""
 DEFAULT = None
 """SIG_DFL, as ctypes shows a null pointer"""
 
@@ -182,15 +182,15 @@ def _numbers(names: tuple[str, ...]) -> tuple[int, ...]:
 
 
 def _unless_used() -> tuple[int, ...]:
-    """Signals that are heard where they would end or halt the process; not where the program ignores them (`nohup`)
-    or uses them."""
+    """Return the signals that would end or halt the process, without those that the program ignores (`nohup`) or
+    uses."""
     return tuple(
         sorted(int(n) for n in signal.valid_signals() if n not in (*_numbers(ALWAYS), *_numbers(NEVER)))
     )
 
 
 def name_of(number: int) -> str:
-    """A signal's name; signals for real time are counted from the first."""
+    """Return a signal's name; real-time signals are counted from the first."""
     try:
         return signal.Signals(number).name
     except ValueError:
@@ -199,7 +199,7 @@ def name_of(number: int) -> str:
 
 @functools.cache
 def _library() -> Any:
-    """The C library."""
+    """Return the C library."""
     library: Any = ctypes.CDLL(None)
     library.signal.argtypes, library.signal.restype = [ctypes.c_int, ctypes.c_void_p], ctypes.c_void_p
     library.sigaction.argtypes = [ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
@@ -208,12 +208,12 @@ def _library() -> Any:
 
 @functools.cache
 def _notice() -> Any:
-    """The compiled handler."""
+    """Return the compiled handler."""
     return compiled_notice(NOTED)
 
 
 def _take() -> None:
-    """Have the system call the compiled handler."""
+    """Install the compiled handler."""
     library, notice = _library(), _notice()
     for number in (*_numbers(ALWAYS), *_unless_used()):
         old = _action(number)
@@ -226,7 +226,7 @@ def _take() -> None:
 
 
 def _end_elsewhere(heard: Signals) -> None:
-    """Give the signals back, where no other loop needs them, and send what came once more."""
+    """Restore the signals that no other loop needs, and send a received one once more."""
     with _changing:
         if id(heard) not in _elsewhere:
             return
@@ -236,7 +236,7 @@ def _end_elsewhere(heard: Signals) -> None:
             return
         library, notice = _library(), _notice()
         for number, old in _replaced.items():
-            # Another handler is one that the program has set meanwhile.
+            # Any other handler was set by the program meanwhile.
             if _handler(_action(number)) == notice.address or number in _quiet:
                 library.sigaction(number, old, None)
         _replaced.clear()
@@ -247,7 +247,7 @@ def _end_elsewhere(heard: Signals) -> None:
 
 
 def _used_by_code(number: int) -> bool:
-    """Whether compiled code hears a signal (`faulthandler` some of them), of which Python knows nothing."""
+    """Whether compiled code handles a signal (`faulthandler` handles some), which Python does not know."""
     if os.name != "posix":
         return False
     handler = _handler(_action(number))
@@ -255,7 +255,7 @@ def _used_by_code(number: int) -> bool:
 
 
 def _action(number: int) -> Any:
-    """What the system does at a signal: its ``struct sigaction``, whose first member is the handler."""
+    """Return the system's action for a signal: its ``struct sigaction``, whose first member is the handler."""
     found = ctypes.create_string_buffer(256)
     _library().sigaction(number, None, found)
     return found

@@ -1,4 +1,4 @@
-"""Names to kinds of rig: built in (`stickslip.rigs.RIGS`), installed, or in a file of one's own."""
+"""Look up kinds of rigs by name: built in (`stickslip.rigs.RIGS`), installed, or in your own file."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from stickslip.rigs.rig import RigKind
 
 
 def rig_kind_names() -> tuple[str, ...]:
-    """The name of every kind of rig."""
+    """Return the names of all kinds of rigs."""
     return (*RIGS, *plugins.installed("stickslip.rigs"))
 
 
 def rig_kind(name: str, named_by: str = "") -> RigKind:
-    """The kind of rig of that name, or of the file of that path; `named_by` as in `law`.
+    """Return the kind of rig with a name, or from the file at a path; `named_by` as in `law`.
 
     Raises
     ------

@@ -1,11 +1,11 @@
-"""The loop: a torque every sample time, from setpoints and a controller, under limits, onto a record.
+"""The loop: in every sample compute a torque from setpoints and a controller, check limits, and record.
 
     with Loop(rig, path="run.stream") as loop:
         rows = loop.run(setpoints(1000, position=0.0, closed=1.0), controller)
 
-It runs in real time, or as fast as it can where the rig's clock is not real. Whatever happens (a limit, an exception
-in a controller or in the rig, a signal, a lost message, a full disk), the torque is ramped to zero within the rig's
-declared time, the record is ended, the rig is closed, and one error says why.
+It runs in real time, or as fast as possible if the rig's clock is not real. Whatever happens (a limit, an exception in
+a controller or in the rig, a signal, a lost message, a full disk), the torque is ramped to zero within the rig's
+declared time, the record is completed, the rig is closed, and one error states the reason.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ from stickslip.stream import Stream
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Result = TypeVar("Result")
 PythonController = Callable[[Measurement, Setpoint], float]
-"""A controller in Python: the torque from what is measured and the setpoint, N·m. It runs sample by sample."""
+"""A controller in Python: returns the torque, N·m, from measurement and setpoint, sample by sample."""
 
 TORQUE, TIME = Setpoint._fields.index("torque"), Measurement._fields.index("time")
 CLOSING, ABANDONED = 10.0, 1.0
-"""s that a rig may take to close: at the end, and from another thread while its exchange does not return"""
+"""Time that a rig may take to close, s: at the end, and from another thread while its exchange does not return"""
 BLOCK = 50
-"""Samples of one compiled block: a signal is heard, and rows are committed, at least that often"""
+"""Samples of one compiled block: signals are checked and rows committed after each block"""
 
 
 class Loop:
-    """Drives a rig; a context manager that arms it and leaves it disarmed.
+    """Runs a rig; a context manager that arms it and disarms it at the end.
 
     Parameters
     ----------
@@ -58,22 +58,22 @@ class Loop:
     path : path or None
         File of the record (`stickslip.stream`), which must not exist yet; None keeps it in memory.
     meta : mapping
-        What the record is to say of the run.
+        Entries for the record's meta.
     limits : Limits or None
-        Narrower ones than the rig's.
+        Tighter limits than the rig's.
     realtime : bool or None
-        Keep pace with the clock. None: where the rig's clock is real, which always must.
+        Run in real time. None: if the rig's clock is real, which requires it.
     without_watchdog : bool
-        Arm a rig that declares no watchdog: nothing takes its torque away if this process dies.
+        Arm a rig without a watchdog: nothing removes its torque if this process dies.
     budget : float
-        By how much a controller in Python may fall behind the clock before the loop stops, s; only in real time.
+        Delay behind the clock at which a Python controller stops the loop, s; only in real time.
 
     Raises
     ------
     InputError
-        If the limits are wider than the rig's, it declares no watchdog, or the budget is none.
+        If the limits are wider than the rig's, it declares no watchdog, or the budget is invalid.
     RigError
-        From `run` and from entering: what the rig or the record could not do.
+        From `run` and on entry: a failure of the rig or of the record.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class Loop:
             raise InputError(f"{rig.name}: its clock is real; it cannot run as fast as it can")
         if rig.capabilities.watchdog is None and not without_watchdog:
             raise InputError(
-                f"{rig.name}: no watchdog is declared, so nothing takes its torque away if this process dies; "
+                f"{rig.name}: no watchdog is declared, so nothing removes its torque if this process dies; "
                 f"give it one, or arm it with {name_option('without_watchdog', True)}"
             )
         if not budget > 0.0:
@@ -119,10 +119,10 @@ class Loop:
     def __enter__(self) -> Loop:
         with ExitStack() as undo:
             self._signals.hear(undo)
-            self._step.rehearse()  # compiles what the loop calls before anything moves
+            self._step.rehearse()  # compiles the functions of the loop before anything moves
             if self.realtime:
                 self._pace.granted = undo.enter_context(soft_real_time())
-            # The record's thread takes over this one's priority: it holds the interpreter's lock for some µs.
+            # The record's thread inherits this one's priority: it keeps the interpreter's lock for some µs.
             self._stream = Stream(
                 UNITS, self._path, self._described(), self._absent(), paced=self.realtime, batch=BLOCK
             )
@@ -144,8 +144,8 @@ class Loop:
                 self._ramp_down()
             except (RigError, InputError):
                 self._guard.leave_untold()
-            self._hear()  # a signal that came between two runs
-        self._hear()  # or while the record was closed
+            self._hear()  # a signal between two runs
+        self._hear()  # or during closing of the record
         if kind is None and (fault := self._guard.untold) is not None:
             raise fault
 
@@ -180,12 +180,12 @@ class Loop:
         return MessageLost(
             f"{self.rig.name}: exchange took {1e3 * took:.3g} ms in a sample of {1e3 * self.rig.sample_time:.3g} ms, "
             f"at a command of {self._guard.torque:.4g} N·m, and is more than its answer_time of "
-            f"{1e3 * self.limits.answer_time:.3g} ms behind the clock; check the connection, or set a greater "
+            f"{1e3 * self.limits.answer_time:.3g} ms behind the clock; check the connection, or increase "
             "answer_time in [rig.limits]"
         )
 
     def _give_up(self, error: RigError) -> None:
-        """Close the rig while its exchange does not return: no ramp can pass through it."""
+        """Close the rig while its exchange does not return, because no ramp can be sent through it."""
         self._guard.ask(error)
         self._guard.cut()
         closing = threading.Thread(target=self._close_quietly, name="close", daemon=True)
@@ -199,11 +199,11 @@ class Loop:
         self._abandon(error)
 
     def _close_quietly(self) -> None:
-        with suppress(Exception):  # closed once more at the end, where what it raises is reported
+        with suppress(Exception):  # closed once more at the end, where its errors are reported
             self.rig.close()
 
     def _abandon(self, error: RigError) -> None:
-        """Leave a call of the rig that does not return; where that is impossible, report it."""
+        """Abandon a call of the rig that does not return; report it if that is impossible."""
         self._signals.release()
         if not self._signals.interrupt(error):
             print(f"stickslip: {error}", file=sys.stderr, flush=True)
@@ -220,13 +220,13 @@ class Loop:
     def _end_record(self) -> None:
         if self._stream is not None:
             self._stream.close({"loop": self.account().plain(), "ended": self._guard.ending})
-            self._guard.at_last(self._stream.fault)  # the file may fail at its end alone
-            self._stream.discard()  # where the rig did not open
+            self._guard.at_last(self._stream.fault)  # the file may fail only at its end
+            self._stream.discard()  # if the rig did not open
 
     # ---- running -------------------------------------------------------------------------------------------
 
     def prepare(self, controller: Controller | PythonController | None) -> Control:
-        """Lay out and compile a `controller`, best before the rig is armed: an armed one has no torque meanwhile."""
+        """Compile a `controller`, preferably before the rig is armed: an armed one has no torque meanwhile."""
         if id(controller) not in self._controls:
             compiled = None if callable(controller) else controller
             control = self.meanwhile(lambda: control_of(compiled, self.limits, self.rig.sample_time))
@@ -247,9 +247,9 @@ class Loop:
         setpoints : array, shape (n, 5)
             A `Setpoint` per sample (`stickslip.rigs.rig.setpoints`).
         controller : Controller, callable or None
-            None: the setpoints' torques alone.
+            None: only the torques of the setpoints.
         travel : float
-            The segment ends early, without a fault, when the axis has moved that far from where it began, rad.
+            Displacement at which the segment ends early, without a fault, rad.
 
         Returns
         -------
@@ -259,9 +259,9 @@ class Loop:
         Raises
         ------
         InputError
-            If setpoints have another shape, or are no numbers.
+            If setpoints have another shape or are not finite.
         RigError
-            After the torque was ramped to zero: why.
+            After the torque was ramped to zero, with the reason.
         """
         stream = self._open_stream()
         if setpoints.ndim == 2 and setpoints.shape[1] == len(Setpoint._fields) - 1:
@@ -283,7 +283,7 @@ class Loop:
         return stream.rows(begin, stream.count)
 
     def pause(self, seconds: float) -> Measurement:
-        """Ramp the torque to zero and let `seconds` pass; nothing is recorded meanwhile."""
+        """Ramp the torque to zero and wait `seconds`; nothing is recorded meanwhile."""
         self._open_stream()
         self._ramp_down()
         if self.rig.capabilities.real_clock:
@@ -302,11 +302,11 @@ class Loop:
         return Measurement(*self._guard.control.measured)
 
     def meanwhile(self, work: Callable[[], Result]) -> Result:
-        """Do `work` (compile, identify) with zero torque; a rig whose clock is real is served all the while.
+        """Do `work` (compile, identify) with zero torque; a rig with a real clock gets its samples meanwhile.
 
         Returns
         -------
-        What `work` returns.
+        The result of `work`.
         """
         if self._stream is None or not self.rig.capabilities.real_clock:
             return work()
@@ -318,15 +318,15 @@ class Loop:
         return future.result()
 
     def account(self) -> Account:
-        """How the loop kept its time."""
+        """Return the timing statistics of the loop."""
         return self._pace.account()
 
     def record(self) -> Record:
-        """What was recorded so far."""
+        """Return the record so far."""
         return self._open_stream().record()
 
     def _rest(self, seconds: float) -> None:
-        """Samples with zero torque that are not recorded; limits are watched."""
+        """Run samples with zero torque that are not recorded; limits are checked."""
         count = max(1, round(seconds / self.rig.sample_time))
         self._take_over(self.prepare(None), math.inf)
         self._pace.restart()
@@ -347,7 +347,7 @@ class Loop:
     # ---- samples -------------------------------------------------------------------------------------------
 
     def _by_samples(self, stream: Stream | None, setpoints: Array, python: PythonController | None) -> None:
-        """Sample by sample through `Rig.exchange`."""
+        """Run sample by sample through `Rig.exchange`."""
         times = self._pace.room(len(setpoints))
         place, stride = setpoints.ctypes.data, setpoints.strides[0]
         with ExitStack() as undo:
@@ -366,7 +366,7 @@ class Loop:
     def _within_budget(
         self, stream: Stream | None, python: PythonController, undo: ExitStack
     ) -> PythonController:
-        """The controller, watched in real time."""
+        """Return the controller, monitored in real time."""
         if not self.realtime or math.isinf(self._budget):
             return python
 
@@ -380,7 +380,8 @@ class Loop:
         def overrun(took: float) -> Overrun:
             return Overrun(
                 f"the controller took {1e3 * took:.3g} ms in a sample of {1e3 * period:.3g} ms and is more than its "
-                f"budget of {1e3 * self._budget:.3g} ms behind the clock; make it faster, or give Loop a greater budget"
+                f"budget of {1e3 * self._budget:.3g} ms behind the clock; make it faster, or "
+                "increase the budget of Loop"
             )
 
         budget = Budget(period, self._budget, overrun, take_over, lenient=self._guard.torque == 0.0)
@@ -388,7 +389,7 @@ class Loop:
         return lambda measured, setpoint: budget.call(python, measured, setpoint)
 
     def _sample(self, stream: Stream | None, setpoint: int, times: Any) -> None:
-        """One sample: control, record, keep pace, exchange. No exception leaves it: each is a reason to stop."""
+        """Run one sample: control, record, wait, exchange. No exception leaves it: each is a reason to stop."""
         begin = time.perf_counter_ns()
         row = self._row(stream)
         if self._signals.number:
@@ -412,17 +413,17 @@ class Loop:
         try:
             self._answered = False
             found: object = cast(object, self._exchange(torque))
-            # One number would be taken for all.
+            # A single number would be used for all.
             if not isinstance(found, tuple) or len(found) != FIELDS:  # type: ignore[reportUnknownArgumentType]
                 raise RigError(f"{self.rig.name}: exchange gave {found!r}; it must give a Measurement")
             measured[:] = found
             self._answered = True
-        except BaseException as error:  # whatever it is: the torque goes to zero first
+        except BaseException as error:  # any exception: the torque goes to zero first
             self._guard.pass_time(self.rig.sample_time)
             self._guard.ask(error, EXCHANGE)
 
     def _row(self, stream: Stream | None) -> int:
-        """Address of where the sample is recorded; without room for it, nowhere, and the loop stops."""
+        """Return the address of the sample's row; without space the sample is not recorded and the loop stops."""
         if stream is not None:
             if stream.fault is not None:
                 self._guard.ask(stream.fault)
@@ -433,7 +434,7 @@ class Loop:
         return self._scratch.ctypes.data
 
     def _ask_python(self, python: PythonController, setpoint: Array) -> None:
-        """The setpoint with the torque of a controller written in Python added."""
+        """Return the setpoint plus the torque of a Python controller."""
         self._setpoint[:] = setpoint
         try:
             self._setpoint[TORQUE] += python(Measurement(*self._guard.control.measured), Setpoint(*setpoint))
@@ -441,7 +442,7 @@ class Loop:
             self._guard.ask(error, CONTROLLER)
 
     def _in_blocks(self, stream: Stream, setpoints: Array) -> None:
-        """In compiled blocks through `BlockRig.exchange_block`."""
+        """Run in compiled blocks through `BlockRig.exchange_block`."""
         rig = cast(BlockRig, self.rig)
         done = 0
         while done < len(setpoints) and self._guard.state < STOPPED and not self._signals.number:
@@ -464,14 +465,14 @@ class Loop:
     # ---- stopping ------------------------------------------------------------------------------------------
 
     def _ramp(self, stream: Stream | None) -> None:
-        """Samples until the torque is zero; the ramp is the compiled one, so its length is bounded."""
+        """Run samples until the torque is zero; the ramp is the compiled one, so its length is bounded."""
         self._setpoint[:] = 0.0
         times = np.zeros(len(TIMES), dtype=np.int64)
         while self._guard.state != STOPPED:
             self._sample(stream, self._setpoint.ctypes.data, times)
 
     def _ramp_down(self) -> None:
-        """Take the torque away without a fault: before a pause and at the end."""
+        """Ramp the torque down without a fault: before a pause and at the end."""
         if self._guard.state == STOPPED:
             return
         if self._guard.begin_ramp():

@@ -1,4 +1,4 @@
-"""One sample of the loop, compiled: what `Loop` calls from Python and block rigs call from their own kernels."""
+"""One compiled sample of the loop, called by `Loop` from Python and by block rigs from their kernels."""
 
 from __future__ import annotations
 
@@ -35,23 +35,23 @@ NOTHING = Controller(Gains(0.0))
 
 
 def record_of(names: Iterable[str]) -> np.dtype[Any]:
-    """A record of numbers, for what arrays hold by place."""
+    """Return a structured type with named fields for the elements of arrays."""
     return np.dtype([(name, np.float64) for name in names])
 
 
 MEASURED, REFERENCE, BOUNDS, SAFETY, REMEMBERED, ROW = map(
     record_of, (Measurement._fields, Setpoint._fields, BoundNames._fields, Safety._fields, NAMES, COLUMNS)
 )
-"""What a sample reads and writes, by name; the last two are the controller's memory and a row of the record."""
+"""Arguments of a sample, by name; the last two are the controller's state and a row of the record."""
 
 
 class Control(NamedTuple):
-    """What one sample reads and writes; every array is one-dimensional and lives as long as this tuple."""
+    """The data of one sample; every array is one-dimensional and lives as long as this tuple."""
 
     address: int
     """of the compiled `stickslip.rigs.safety.guarded`"""
     measured: Any
-    """The newest `Measurement`: the rig writes it"""
+    """The latest `Measurement`, written by the rig"""
     bounds: Any
     safety: Any
     settings: Any
@@ -67,7 +67,7 @@ def control_of(
     sample_time: float,
     travel: float = math.inf,
 ) -> Control:
-    """Lay out and compile the sample of a controller (None: torques alone) under limits.
+    """Compile the sample of a controller (None: torques alone) with limits.
 
     Parameters
     ----------
@@ -77,15 +77,15 @@ def control_of(
     sample_time : float
         The rig's, s.
     travel : float
-        Displacement from where the segment begins that ends it without a fault, rad.
+        Displacement that ends the segment without a fault, rad.
 
     Raises
     ------
     InputError
-        If the controller is meant for another sample time.
+        If the controller has another sample time.
     """
     chosen = sampled_by(controller or NOTHING, sample_time, "rig")
-    # The setpoints' torques alone are given as they are.
+    # Without a controller the torques of the setpoints are applied unchanged.
     numbers = chosen.settings if controller else chosen.settings._replace(fade=0.0)
     memory = np.zeros(len(NAMES))
     memory.view(REMEMBERED)["open"] = 1.0
@@ -103,7 +103,7 @@ def control_of(
 
 
 def begin_learned(control: Control, controller: Controller | None, learned: Mapping[str, Any] | None) -> None:
-    """Let a controller begin with what it has learned before."""
+    """Initialise a controller with what it has learned before."""
     if controller and learned:
         control.state[:] = flat(controller.packed_state(controller.state(learned)))
 
@@ -115,7 +115,7 @@ def end_learned(
     sample_time: float,
     meta: dict[str, Any],
 ) -> None:
-    """`learned` gets what a controller has learned as it keeps it, a record's `meta` what there is to say of it."""
+    """Store what a controller has learned in `learned`, and a description of it in the record's `meta`."""
     if controller is None:
         return
     if learned is not None:
@@ -128,7 +128,7 @@ _compiled: dict[Any, int] = {}
 
 
 def sampler(controller: Controller) -> int:
-    """Address of one guarded sample of a controller."""
+    """Return the address of one guarded sample of a controller."""
     laws = controller.laws
     if laws not in _compiled:
         function = guarded_by(controller.functions)
@@ -142,11 +142,11 @@ GUARD = {
     "b": Layout.of(fields_of(BoundNames), counted=False),
     "s": Layout.of(fields_of(Safety), counted=False),
 }
-"""Layouts of what the guard reads and writes."""
+"""Layouts of the data of the guard."""
 
 
 class Sample(NamedTuple):
-    """Addresses of what one sample takes, in the order of its function, and of the row that is recorded."""
+    """Addresses of the arguments of one sample, in the order of its function, and of the recorded row."""
 
     address: int
     measured: Any
@@ -163,7 +163,7 @@ class Sample(NamedTuple):
 
 @kernel(inline=True)
 def step(at: Sample) -> float:
-    """One guarded sample; ``row`` gets what the record keeps."""
+    """Run one guarded sample; ``row`` gets the values to record."""
     torque = call_guarded(
         at.address, at.measured, at.setpoint, at.bounds, at.safety, at.settings, at.memory, at.state, at.parameters,
         at.surroundings,
@@ -184,7 +184,7 @@ def step(at: Sample) -> float:
 
 @kernel()
 def decide(control: Control, setpoint: Any, row: Any) -> float:
-    """The torque for the next sample, N·m, from ``control.measured``; `row` gets what the record keeps."""
+    """Return the torque for the next sample, N·m, from ``control.measured``; `row` gets the values to record."""
     return step(
         Sample(
             control.address, pointer(control.measured, 0), pointer(setpoint, 0), pointer(control.bounds, 0),
@@ -196,12 +196,12 @@ def decide(control: Control, setpoint: Any, row: Any) -> float:
 
 
 ADDRESSES = np.dtype([(name, np.int64) for name in Sample._fields])
-"""A `Sample` as whole numbers, which Python can write."""
+"""A `Sample` as integers, which Python can write."""
 
 
 @kernel()
 def decide_at(addresses: Any) -> float:
-    """`decide` by `ADDRESSES`."""
+    """Call `decide` by `ADDRESSES`."""
     a = record_at(pointer(addresses, 0), ADDRESSES)
     return step(
         Sample(
@@ -214,12 +214,12 @@ def decide_at(addresses: Any) -> float:
 
 @kernel()
 def nothing_at(_: Any) -> float:
-    """What `decide_at` takes for being called."""
+    """Do nothing, to measure the time of a call of `decide_at`."""
     return 0.0
 
 
 def addresses(control: Control) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """`ADDRESSES` of a control, which must outlive them; those of setpoint and row are 0."""
+    """Return the `ADDRESSES` of a control, which must outlive them; those of setpoint and row are 0."""
     out = np.zeros(1, ADDRESSES)
     out["address"] = control.address
     for name in control._fields[1:]:

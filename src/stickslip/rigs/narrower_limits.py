@@ -1,4 +1,4 @@
-"""A rig with narrower limits than its own: plans, checks and the loop see these alone."""
+"""A rig with tighter limits than its own: plans, checks and the loop use only these."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ LIMITS = (
 
 
 class Limited:
-    """A rig under other limits; everything else is the rig's.
+    """A rig with other limits; everything else is the rig's.
 
     Parameters
     ----------
     rig : Rig
     limits : Limits
-        None wider than the rig's.
+        Not wider than the rig's.
 
     Raises
     ------
@@ -41,7 +41,7 @@ class Limited:
 
     @property
     def limits(self) -> Limits:
-        """The narrower ones."""
+        """The tighter limits."""
         return self._limits
 
     @property
@@ -68,7 +68,7 @@ class Limited:
         return self._rig.exchange(torque)
 
     def exchange_block(self, control: Control, setpoints: Array, rows: Array) -> int:
-        """As the rig, if it has blocks; `Capabilities.blocks` says so."""
+        """As the rig, if `Capabilities.blocks` is true."""
         return cast(BlockRig, self._rig).exchange_block(control, setpoints, rows)
 
     def pause(self, seconds: float) -> Measurement:
@@ -80,12 +80,12 @@ class Limited:
         self._rig.close()
 
     def __getattr__(self, name: str) -> Any:
-        # What else a rig has (a virtual one its machine) is asked of it.
+        # All other attributes (such as a virtual rig's machine) are the rig's.
         return getattr(self._rig, name)
 
 
 def limited(rig: Rig, values: Mapping[str, float]) -> Rig:
-    """The rig with these limits by name (`LIMITS`); the rig itself where there are none.
+    """Return the rig with these limits by name (`LIMITS`); the rig itself without any.
 
     Raises
     ------

@@ -1,9 +1,8 @@
-"""Keeping pace with the clock from Python, and the account of how well that went.
+"""Run a loop in real time from Python, and record its timing statistics.
 
-What a soft real-time loop in Python can do, it does: the garbage collector is stopped, other threads of the process
-give way within 50 µs, the process gets a real-time priority and its memory stays in RAM where the system permits it,
-sleeps end on time instead of up to 50 µs late, and the last stretch before a deadline is waited for awake. What was
-granted is in the account. See docs/howto/loop.md.
+The garbage collector is stopped, other threads of the process yield within 50 µs, the process gets a real-time priority
+and its memory stays in RAM if the system permits it, sleeps end on time instead of up to 50 µs late, and the time just
+before a deadline is a busy wait. The account lists what was granted. See docs/howto/loop.md.
 """
 
 from __future__ import annotations
@@ -21,11 +20,11 @@ from typing import Any
 import numpy as np
 
 TIMES = ("lateness", "own", "control", "empty")
-"""What is timed of every sample, in ns."""
+"""Times measured in every sample, ns."""
 
 AWAKE = 80_000
-"""ns before a deadline that are waited for awake: what a sleep may come late on an ordinary kernel"""
-PRIORITY = 50  # of SCHED_FIFO: above everything ordinary, below the kernel's own threads
+"""Busy wait before a deadline, ns: the delay of a sleep on an ordinary kernel"""
+PRIORITY = 50  # of SCHED_FIFO: above ordinary processes, below the kernel's own threads
 PR_SET_TIMERSLACK = 29
 MCL_CURRENT, MCL_ONFAULT = 1, 4
 PERCENTILES = (50.0, 99.0, 99.9, 100.0)
@@ -33,26 +32,26 @@ PERCENTILES = (50.0, 99.0, 99.9, 100.0)
 
 @dataclass(frozen=True)
 class Account:
-    """How a loop kept its time; distributions are the 50th, 99th and 99.9th percentile and the greatest, s.
+    """Timing statistics of a loop; distributions are the 50th, 99th and 99.9th percentile and the maximum, s.
 
     Attributes
     ----------
     samples : int
     missed : int
-        Deadlines missed: the loop was not ready for a sample when it was due. The schedule then begins anew there.
+        Deadlines missed: the loop was not ready for a sample when it was due. The schedule then restarts there.
     lateness : tuple of float
-        From when a sample was due until its torque was handed over.
+        From the due time of a sample until its torque was sent.
     own : tuple of float
-        What the loop itself does in a sample, by the clock: limits, control, recording.
+        Time of the loop itself in a sample: limits, control, recording.
     control : tuple of float
         CPU time of the compiled control step (limits, controller and safety).
     empty : tuple of float
-        CPU time of a compiled function that does nothing, by the same clock in the same samples: what calling it, the
-        clock itself and the machine's interrupts take, which are in `control` too. Only in real time.
+        CPU time of a compiled function that does nothing, in the same samples: call, clock and interrupts, which
+        `control` contains too. Only in real time.
     faults, preempted : int
-        Pages that the loop's thread had to fetch during its samples, and how often the processor was taken from it.
+        Page faults of the loop's thread during its samples, and number of preemptions.
     granted : tuple of str
-        What the system granted: real-time priority, locked memory, precise sleeps.
+        Granted by the system: real-time priority, locked memory, precise sleeps.
     """
 
     samples: int
@@ -66,11 +65,11 @@ class Account:
     preempted: int = 0
 
     def plain(self) -> dict[str, Any]:
-        """As plain data, for a record's meta."""
+        """Return plain data for a record's meta."""
         return asdict(self)
 
     def lines(self) -> list[str]:
-        """For people, a line each."""
+        """Return lines of text."""
         out = [f"{self.samples} samples, {self.missed} deadlines missed"]
         for name, values in (
             ("late", self.lateness),
@@ -101,7 +100,7 @@ class Pace:
         self._faults = self._preempted = 0
 
     def restart(self) -> None:
-        """The next deadline is a sample time from now: what took long before is no miss."""
+        """Set the next deadline a sample time from now, so earlier delays are not counted as missed."""
         self._due = 0
 
     @contextmanager
@@ -116,16 +115,15 @@ class Pace:
             self._preempted += now[1] - preempted
 
     def room(self, count: int) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """Where the times of the next `count` samples go: `TIMES`, in ns."""
+        """Return the array for the times of the next `count` samples: `TIMES`, in ns."""
         table = np.full((count, len(TIMES)), -1, dtype=np.int64)
         self._taken.append(table)
         return table
 
     def wait(self, rehearse: Callable[[], object]) -> int:
-        """Wait for the deadline; returns by how much it is late, ns.
+        """Wait for the deadline; return the delay, ns.
 
-        While it is waited for awake, `rehearse` is called: what the sample will run is then in the processor's caches,
-        which other processes have used meanwhile.
+        During the busy wait `rehearse` is called, which loads the code of the sample into the processor's caches again.
         """
         now = time.monotonic_ns()
         if self._due == 0:
@@ -143,7 +141,7 @@ class Pace:
         return late
 
     def account(self) -> Account:
-        """What has been measured so far."""
+        """Return the statistics so far."""
         taken = np.concatenate(self._taken) if self._taken else np.zeros((0, len(TIMES)), dtype=np.int64)
         columns = [column[column >= 0] for column in taken.T]
         late, own, control, empty = (
@@ -163,7 +161,7 @@ class Pace:
 
 
 def usage() -> tuple[int, int]:
-    """Page faults of this thread so far, and how often it was preempted; zeros where the system does not say."""
+    """Return page faults and preemptions of this thread so far; zeros if the system does not report them."""
     try:
         import resource
 
@@ -178,7 +176,7 @@ def usage() -> tuple[int, int]:
 
 @contextmanager
 def soft_real_time() -> Generator[tuple[str, ...]]:
-    """Ask for everything that keeps a Python loop on time; gives what was granted, undoes it at the end."""
+    """Request everything that keeps a Python loop on time; yield what was granted, and undo it at the end."""
     with ExitStack() as undo:
         granted = ["garbage collector off"]
         gc.collect()
@@ -216,7 +214,7 @@ def _libc() -> Any:
 
 
 def _slack() -> Callable[[], None] | None:
-    """Sleeps may by default end up to 50 µs late."""
+    """Set the timer slack: by default sleeps may end up to 50 µs late."""
     libc = _libc()
     if libc is None or libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0) != 0:
         return None
@@ -224,7 +222,7 @@ def _slack() -> Callable[[], None] | None:
 
 
 def _lock() -> Callable[[], None] | None:
-    """Keep what is in memory there: no page comes back from the disk inside the loop."""
+    """Lock memory, so no page is loaded from disk inside the loop."""
     libc = _libc()
     if libc is None or libc.mlockall(MCL_CURRENT | MCL_ONFAULT) != 0:
         return None

@@ -1,6 +1,6 @@
-"""A recorded run as a rig: it answers what was measured then, whatever torque it is given.
+"""A recorded run as a rig: it returns the recorded measurements, whatever torque it is given.
 
-What the loop, its limits or a controller would have made of a run is so asked of the record alone. Nothing moves.
+This tests the loop, its limits or a controller with the record alone. Nothing moves.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 UNLIMITED = Limits(torque=1e9, speed=1e9)
 """Nothing moves: there is nothing to protect"""
-UNEVEN = 0.01  # of the sample time, by which a recorded time may be off before the record is resampled
+UNEVEN = 0.01  # of the sample time: deviation of a recorded time at which the record is resampled
 ROW = 150
-"""Bytes of a sample that is resampled, with what it is computed from"""
+"""Bytes of a resampled sample, with its sources"""
 CHANNELS = ("position", "motor_torque", "sensor_torque", "temperature", "status")
 
 
@@ -36,17 +36,18 @@ class Replay:
     Parameters
     ----------
     record : Record
-        With ``position`` (rad), and as far as it has them ``motor_torque``, ``sensor_torque`` (N·m), ``temperature``
-        (°C) and ``status``.
+        With ``position`` (rad), and optionally ``motor_torque``, ``sensor_torque`` (N·m), ``temperature`` (°C) and
+        ``status``.
     sample_time : float or None
-        s; None takes the one its meta tells, else the median of its times. A record with other times is
-        interpolated linearly.
+        s; None: the one in its meta, else the median of its time steps. A record with other times is interpolated
+        linearly.
     limits : Limits or None
 
     Raises
     ------
     InputError
-        If the record has no position, fewer than two samples or times that do not ascend, or the sample time is none.
+        If the record has no position, fewer than two samples or times that are not increasing, or the sample time is
+        invalid.
     """
 
     name = "replay"
@@ -59,7 +60,7 @@ class Replay:
         record["position"]  # raises where there is none
         insist_on_order(record.time)
         self.sample_time = usable(sample_time_of(record) if sample_time is None else sample_time)
-        # It answers neither the torque nor the clock of whoever asks.
+        # It depends neither on the torque nor on the clock of the caller.
         self.limits = replace(limits or UNLIMITED, answer_time=math.inf, standstill_torque=math.inf)
         self.capabilities = Capabilities(
             Watchdog(0.0, "nothing moves"),
@@ -71,12 +72,12 @@ class Replay:
         self._next = 0
 
     def _laid_out(self, record: Record) -> Array:
-        """Rows of `Measurement`, a sample time apart but for pauses."""
+        """Return rows of `Measurement`, one sample time apart except for pauses."""
         time: Array = record.time
         steps = np.diff(time)
         uneven = np.abs(steps - self.sample_time) > UNEVEN * self.sample_time
         at = time
-        # A gap is a pause of the run; what is merely uneven is resampled.
+        # A gap is a pause of the run; uneven times are resampled.
         if np.any(uneven & (steps < 2.0 * self.sample_time)):
             span = float(time[-1] - time[0])
             count = (
@@ -94,24 +95,24 @@ class Replay:
         return rows
 
     def open(self) -> Measurement:
-        """The first sample."""
+        """Return the first sample."""
         self._next = 0
         return self._answer()
 
     def exchange(self, torque: float) -> Measurement:
-        """The next sample.
+        """Return the next sample.
 
         Raises
         ------
         RigError
-            Where the record ends.
+            At the end of the record.
         """
         return self._answer()
 
     def pause(self, seconds: float) -> Measurement:
-        """The first sample after the pause that was recorded, or after `seconds` of the record."""
+        """Return the first sample after the recorded pause, or after `seconds` of the record."""
         times = self._rows[: self._next, 0]
-        # The last sample before a pause is followed by no torque, so a record goes on with the first one after it.
+        # No torque follows the last sample before a pause, so the record continues with the first one after it.
         if times.size > 1 and times[-1] - times[-2] > 1.5 * self.sample_time:
             return self._row(self._next - 1)
         end: float = self._rows[max(self._next - 1, 0), 0] + seconds - 0.5 * self.sample_time
@@ -134,7 +135,7 @@ class Replay:
 
 
 def sample_time_of(record: Record) -> float:
-    """What the record says of itself, or the median between its times, to the nanosecond; s."""
+    """Return the sample time of the record's meta, or the median of its time steps, to the nanosecond; s."""
     told = record.meta.get("sample_time")
     if isinstance(told, float):
         return told
@@ -143,12 +144,12 @@ def sample_time_of(record: Record) -> float:
 
 
 def insist_on_order(time: Array) -> None:
-    """Refuse times that are no numbers or do not ascend.
+    """Refuse times that are not finite or not increasing.
 
     Raises
     ------
     InputError
-        That names the first.
+        Names the first.
     """
     wrong = np.flatnonzero(~np.isfinite(time))
     if wrong.size:
@@ -157,13 +158,13 @@ def insist_on_order(time: Array) -> None:
     if back.size:
         row = int(back[0])
         raise InputError(
-            f"replay: time goes from {time[row]:.9g} to {time[row + 1]:.9g} s after row {row}, and must ascend; let "
-            "`stickslip doctor` look at the log"
+            f"replay: time goes from {time[row]:.9g} to {time[row + 1]:.9g} s after row {row} and is not increasing; "
+            "check the log with `stickslip doctor`"
         )
 
 
 def usable(sample_time: float) -> float:
-    """The sample time, if a loop can run with it, s.
+    """Return the sample time if a loop can run with it, s.
 
     Raises
     ------
@@ -178,7 +179,7 @@ def usable(sample_time: float) -> float:
 
 
 def build(settings: Table) -> Replay:
-    """From ``file`` (any log that `stickslip.readers` reads), ``sample_time`` and ``limits``."""
+    """Build from ``file`` (any log that `stickslip.readers` reads), ``sample_time`` and ``limits``."""
     path = settings.document.locate(settings.text("file"))
     sample_time = settings.positive("sample_time", "s") if settings.has("sample_time") else None
     return Replay(read(path), sample_time=sample_time, limits=limits_in(settings, UNLIMITED))

@@ -1,6 +1,6 @@
-"""What a rig is: something that takes a torque every sample time and says what it measured.
+"""The interface of a rig, which accepts a torque every sample time and returns measurements.
 
-The loop (`stickslip.rigs.loop`) drives any `Rig`; procedures are written against the loop. One sample is::
+The loop (`stickslip.rigs.loop`) runs any `Rig`; procedures use the loop. One sample is::
 
     measured = rig.open()
     for every sample:
@@ -8,7 +8,7 @@ The loop (`stickslip.rigs.loop`) drives any `Rig`; procedures are written agains
         measured = rig.exchange(torque)                      # acts for one sample time, then measures
 
 A rig whose plant is compiled may also be a `BlockRig`, which runs these lines for many samples in one compiled loop;
-both ways give the same numbers, bit for bit, since both call the same compiled `decide`.
+both give the same numbers bit for bit, because both call the same compiled `decide`.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 LIMIT_UNITS = {
     "position": "rad", "speed": "rad/s", "torque": "N·m", "temperature": "°C", "following error": "rad",
 }  # fmt: skip
-"""Limits by their names in messages"""
+"""Units of limits, by their names in messages"""
 STANDSTILL = 0.8
-"""Share of the torque limit: the largest break-away torque that a commissioning can exceed by a quarter."""
+"""Default share of the torque limit: the largest break-away torque that a commissioning can exceed by a quarter."""
 
 
 class Measurement(NamedTuple):
-    """What a rig measured at the end of a sample; NaN where it has no such sensor."""
+    """Measurements at the end of a sample; NaN without a sensor."""
 
     time: float
     """s, of the rig's own clock, increasing by a sample time from one sample to the next"""
@@ -50,7 +50,7 @@ class Measurement(NamedTuple):
     temperature: float = math.nan
     """Degrees Celsius"""
     status: float = 0.0
-    """0 if all is well, else the rig's own number of its fault (CiA 402: error code 603Fh); a fault stops the loop"""
+    """0 without a fault, else the rig's own fault number (CiA 402: error code 603Fh); a fault stops the loop"""
 
 
 class Setpoint(NamedTuple):
@@ -61,13 +61,13 @@ class Setpoint(NamedTuple):
     velocity: float = 0.0
     """rad/s"""
     torque: float = 0.0
-    """Added to the controller's output; alone where the loop is open, N·m"""
+    """Added to the controller's output; the only torque if the loop is open, N·m"""
     closed: float = 0.0
-    """1: the controller follows position and velocity, and the following error is watched. Its first command is the
-    last one given; its integral takes the difference, or that fades over 0.1 s. 0: torque alone; the controller
-    forgets what it knew"""
+    """1: the controller follows position and velocity, and the following error is checked. Its first command equals the
+    last command; its integral absorbs the difference, or that fades over 0.1 s. 0: torque alone; the controller is
+    reset"""
     acceleration: float = 0.0
-    """rad/s², for a compensator that feeds the inertia forward"""
+    """rad/s², for an inertia feedforward"""
 
 
 def setpoints(
@@ -79,7 +79,7 @@ def setpoints(
     closed: Any = 0.0,
     acceleration: Any = 0.0,
 ) -> Array:
-    """Setpoints of `count` samples, shape (count, 5).
+    """Return setpoints of `count` samples, shape (count, 5).
 
     ``position`` (rad), ``velocity`` (rad/s), ``torque`` (N·m), ``closed`` (0 or 1) and ``acceleration`` (rad/s²) are
     numbers or arrays of that length; see `Setpoint`.
@@ -91,12 +91,12 @@ def setpoints(
 
 
 def insist_on_setpoints(table: Array) -> None:
-    """Refuse setpoints that no loop can follow, before any of them is given.
+    """Refuse invalid setpoints before any of them is applied.
 
     Raises
     ------
     InputError
-        For another shape, or the first that is no number.
+        For another shape, or the first value that is not finite.
     """
     names = Setpoint._fields
     if table.ndim != 2 or table.shape[1] != len(names):
@@ -105,14 +105,14 @@ def insist_on_setpoints(table: Array) -> None:
     if wrong.size:
         row, column = wrong[0].tolist()
         raise InputError(
-            f"setpoint {row} has {names[column]} = {table[row, column]:g}, which must be a finite number; fix what "
-            "made it"
+            f"setpoint {row} has {names[column]} = {table[row, column]:g}, which must be a finite number; correct its "
+            "source"
         )
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a rig allows. Crossing any of them ramps the torque to zero (`stickslip.rigs.safety`).
+    """Limits of a rig. Crossing any of them ramps the torque to zero (`stickslip.rigs.safety`).
 
     Attributes
     ----------
@@ -120,20 +120,19 @@ class Limits:
         Largest torque command, N·m. Measured torques (motor, sensor) may exceed it by a quarter: overshoot of the
         current loop and noise.
     speed : float
-        rad/s, by the difference of two samples' positions.
+        rad/s, from the positions of two samples.
     position : (float, float)
-        Lowest and highest position, rad; infinite for an axis that turns freely.
+        Lowest and highest position, rad; infinite for an axis without end stops.
     temperature : float
-        Highest, degrees Celsius; infinite where it is not measured.
+        Highest temperature, degrees Celsius; infinite if it is not measured.
     following_error : float
         Largest distance between reference and measured position while the loop is closed, rad.
     stop_time : float
-        The declared time of a stop, s: from the sample that sees the reason until the torque command is zero. The
-        torque falls by ``torque / stop_time``, so a smaller torque is gone sooner.
+        Duration of a stop, s: from the sample that detects the reason until the torque command is zero. The torque
+        falls at the rate ``torque / stop_time``, so a smaller torque reaches zero sooner.
     answer_time : float
-        How long the rig may be without a plausible answer, s (`stickslip.rigs.safety`): `Rig.exchange` takes longer
-        than a sample, its clock runs at another rate, readings freeze although the torque must change them.
-        Infinite: the rig is not watched.
+        Longest time without a plausible answer, s (`stickslip.rigs.safety`): `Rig.exchange` takes longer than a sample,
+        its clock runs at another rate, readings freeze although the torque must change them. Infinite: not checked.
     standstill_torque : float
         Largest torque at which the axis may be at rest, N·m: more than its greatest break-away torque. 0 selects
         four fifths of ``torque``, as identification needs 1.25 times the break-away torque.
@@ -172,12 +171,12 @@ class Limits:
             raise ParameterError("limits: temperature = nan °C must be a number")
 
     def narrowed(self, narrower: Limits) -> Limits:
-        """Return the limits `narrower`, which may not be wider than these.
+        """Return the tighter limits, which may not be wider than these.
 
         Raises
         ------
         InputError
-            Which limit is, and the value here.
+            Names the limit and its value here.
         """
         for name in (
             "torque", "speed", "temperature", "following_error", "stop_time", "answer_time", "standstill_torque",
@@ -192,14 +191,14 @@ class Limits:
         return narrower
 
     def text(self, name: str) -> str:
-        """A limit for people, without its unit; empty where there is none of that name."""
+        """Return a limit as text, without its unit; empty for an unknown name."""
         if name == "position":
             return "{:g} to {:g}".format(*self.position)
         value: float | None = getattr(self, name.replace(" ", "_"), None)
         return "" if value is None or name not in LIMIT_UNITS else f"{value:g}"
 
     def plain(self) -> dict[str, Any]:
-        """As plain data for a record's meta; a limit that is infinite is left out."""
+        """Return plain data for a record's meta, without infinite limits."""
         low, high = self.position
         values = {**vars(self), "position": None, "lowest_position": low, "highest_position": high}
         return {k: v for k, v in values.items() if v is not None and math.isfinite(v)}
@@ -207,9 +206,9 @@ class Limits:
 
 @dataclass(frozen=True)
 class Watchdog:
-    """The rig's own: what takes the torque away when the loop's process dies.
+    """The rig's own watchdog, which removes the torque when the loop's process dies.
 
-    ``time`` is how long it may take, s; ``how`` says what does it, for people.
+    ``time`` is its longest reaction time, s; ``how`` describes it for people.
     """
 
     time: float
@@ -218,16 +217,16 @@ class Watchdog:
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What a rig can do.
+    """Capabilities of a rig.
 
     Attributes
     ----------
     watchdog : Watchdog or None
-        None: nothing takes the torque away if this process dies; such a rig is armed only on request.
+        None: nothing removes the torque if this process dies; such a rig is armed only on request.
     real_clock : bool
-        True: its time passes by itself, so the loop must keep pace. False: a sample passes when it is exchanged.
+        True: its time advances by itself, so the loop must run in real time. False: each exchange is one sample.
     blocks : bool
-        It is a `BlockRig`.
+        Whether it is a `BlockRig`.
     torque_sensor, temperature : bool
         Whether it measures them.
     """
@@ -241,16 +240,16 @@ class Capabilities:
 
 @runtime_checkable
 class Rig(Protocol):
-    """Takes a torque every sample time and says what it measured.
+    """Accepts a torque every sample time and returns measurements.
 
-    ``open``, ``exchange`` and ``pause`` raise `stickslip.errors.RigError` for what went wrong: `MessageLost` where the
-    rig did not answer in time, `DriveFault` where it answered with a fault. `exchange` first sends, then waits for the
-    answer: the loop goes on calling it while it ramps the torque to zero, whatever it raises.
+    ``open``, ``exchange`` and ``pause`` raise `stickslip.errors.RigError`: `MessageLost` if the rig did not answer in
+    time, `DriveFault` if it answered with a fault. `exchange` first sends, then waits for the answer: the loop
+    continues to call it while it ramps the torque to zero, whatever it raises.
     """
 
     @property
     def name(self) -> str:
-        """What the record says it comes from."""
+        """Name of the source in the record."""
         ...
 
     @property
@@ -260,24 +259,24 @@ class Rig(Protocol):
 
     @property
     def limits(self) -> Limits:
-        """What may never be exceeded; a run may ask for less."""
+        """Limits that are never exceeded; a run may tighten them."""
         ...
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can do."""
+        """Capabilities of the rig."""
         ...
 
     def open(self) -> Measurement:
-        """Connect, check and arm, with zero torque; returns the first measurement."""
+        """Connect, check and arm, with zero torque; return the first measurement."""
         ...
 
     def exchange(self, torque: float) -> Measurement:
-        """Apply a torque (N·m) from now on, for one sample time; returns what is measured after it."""
+        """Apply a torque (N·m) for one sample time from now; return the measurement at its end."""
         ...
 
     def pause(self, seconds: float) -> Measurement:
-        """Let time pass with zero torque; a virtual rig advances its clock without stepping through it."""
+        """Wait with zero torque; a virtual rig advances its clock without simulating every sample."""
         ...
 
     def close(self) -> None:
@@ -291,7 +290,7 @@ class BlockRig(Rig, Protocol):
     """A rig that runs plant, controller and safety in one compiled loop."""
 
     def exchange_block(self, control: Control, setpoints: Array, rows: Array) -> int:
-        """Run up to ``len(setpoints)`` samples; returns how many were run.
+        """Run up to ``len(setpoints)`` samples; return their number.
 
         In a compiled loop, for every sample k: ``torque = decide(control, setpoints[k], rows[k])``, advance the plant
         by a sample with that torque, write what is then measured to ``control.measured`` (the order of `Measurement`),
@@ -310,7 +309,7 @@ class RigKind:
     name : str
     build : callable
         ``build(settings) -> Rig`` from the ``[rig]`` table of a TOML file (`stickslip.rigs.files`); raises
-        `stickslip.errors.InputError` for what it cannot use.
+        `stickslip.errors.InputError` for invalid settings.
     title : str
         One line for people.
     """

@@ -1,12 +1,11 @@
-"""The safety of the loop: limits, what is expected of the rig's answers, and the stop itself, one sample at a time.
+"""The safety of the loop: limits, plausibility of the rig's answers, and the stop, one sample at a time.
 
-`guarded` is one whole sample of the loop: it watches the limits, runs the controller
-(`stickslip.control.composition`), and from the sample that sees a reason to stop on it ramps the torque to zero. It is
-written in the scalar subset (`stickslip.subset`), so that it is the same compiled code in every loop, and plain
-Python in a test. Once the ramp has begun nothing but the number of samples decides the torque: no measurement, no
-setpoint and no controller can prolong it.
+`guarded` is one whole sample of the loop: it checks the limits, runs the controller (`stickslip.control.composition`),
+and from the sample that detects a reason to stop it ramps the torque to zero. It is written in the scalar subset
+(`stickslip.subset`), so every loop runs the same compiled code, and tests run plain Python. Once the ramp has started,
+only the number of samples determines the torque: no measurement, setpoint or controller can prolong it.
 
-What is expected of an answer, all within `stickslip.rigs.rig.Limits.answer_time` (t):
+Checks of an answer, all within `stickslip.rigs.rig.Limits.answer_time` (t):
 
 - Its time increases in every sample, by no more than a sample and t, and not for t at a rate that is a quarter off.
 - The position changes within t if a torque acts that must move the axis. If the encoder is coarse, an axis at rest
@@ -24,7 +23,7 @@ What is expected of an answer, all within `stickslip.rigs.rig.Limits.answer_time
 A limit may be crossed before t has passed. Then a measured torque that differs, and an axis whose speed has grown
 against the torque for ten samples, are named as the possible cause.
 
-While the loop is open the laws run, so that an observer knows the disturbance when it is closed.
+While the loop is open the laws run, so an observer knows the disturbance when it is closed.
 
 Arguments: what is measured ``y`` (`Measurement`) and its setpoint ``w`` (`Setpoint`), the bounds ``b``, the memory of
 the safety ``s``, and the controller's settings ``n``, memory ``m``, and laws ``z``, ``p``, ``u``.
@@ -45,7 +44,7 @@ from stickslip.spec import Par
 # goes on.
 RUNNING, STOPPING, STOPPED, ENDED = 0.0, 1.0, 2.0, 3.0
 
-# Reasons to stop.
+# Reasons to stop:
 NONE, POSITION, SPEED, TORQUE, TEMPERATURE, FOLLOWING, NOT_FINITE, STATUS, ASKED = (
     0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0,
 )  # fmt: skip
@@ -57,10 +56,10 @@ REASONS = (
 """Words for the channel ``reason`` of a record."""
 
 MEASURED = 1.25  # of the largest command, that a measured torque may reach: overshoot and noise
-UNBOUNDED = 1e300  # stands for no bound
+UNBOUNDED = 1e300  # means no bound
 
-# What is expected of the rig's answers; the module says why.
-RATE = 0.25  # of the sample time, by which the clock's steps may be off for long
+# Thresholds for the rig's answers; reasons are in the module's docstring.
+RATE = 0.25  # of the sample time: lasting deviation of the clock's steps
 SLID, SLIDING = 10.0, 0.05  # samples in a row, and of the speed limit: the axis slides
 CHANGED = 0.1  # of the torque limit: a command that has changed, or is large enough to be compared
 UNLIKE = 1.0 / 3.0  # of the command, and
@@ -87,7 +86,7 @@ class Bounds(NamedTuple):
 
 
 class Safety(NamedTuple):
-    """What the safety remembers from sample to sample."""
+    """State of the safety from sample to sample."""
 
     state: Annotated[float, Par("-", "", "0 running, 1 stopping, 2 stopped, 3 segment ended")]
     reason: Annotated[float, Par("-", "", "why it stops: `REASONS`")]
@@ -126,7 +125,7 @@ class Safety(NamedTuple):
 
 
 def bounds(limits: Limits, sample_time: float, travel: float = math.inf) -> Bounds:
-    """The limits laid out; the ramp has as many samples as fit into ``stop_time``, at least one."""
+    """Return the limits as numbers; the ramp has as many samples as fit into ``stop_time``, at least one."""
     steps = max(1, math.floor(limits.stop_time / sample_time + 1e-9))
     low, high = limits.position
     return Bounds(
@@ -145,7 +144,7 @@ def bounds(limits: Limits, sample_time: float, travel: float = math.inf) -> Boun
 
 
 def stop(reason: float, value: float, s: Any) -> None:
-    """Begin to stop; the first reason is kept. A ramp between two segments has none until something is wrong."""
+    """Start to stop and keep the first reason. A ramp between two segments has none unless something is wrong."""
     if s.state != STOPPED and s.reason == NONE:
         s.state = STOPPING
         s.reason = reason
@@ -153,7 +152,7 @@ def stop(reason: float, value: float, s: Any) -> None:
 
 
 def watch_motion(y: Any, w: Any, b: Any, s: Any) -> None:
-    """Limits on position, speed and following error. NaN fails every comparison, so it is asked for first."""
+    """Check position, speed and following error. NaN fails every comparison, so it is tested first."""
     if not abs(y.position) < UNBOUNDED:
         stop(NOT_FINITE, y.position, s)
         return
@@ -170,25 +169,26 @@ def watch_motion(y: Any, w: Any, b: Any, s: Any) -> None:
 
 
 def watch_state(y: Any, b: Any, s: Any) -> None:
-    """The rig's status, measured torques and temperature; a sensor that the rig lacks reads NaN."""
+    """Check status, measured torques and temperature; a missing sensor reads NaN."""
     if y.status != 0.0:
         stop(STATUS, y.status, s)
     if abs(y.torque) > MEASURED * b.torque:
         stop(TORQUE, y.torque, s)
     if abs(y.sensor) > MEASURED * b.torque:
         stop(TORQUE, y.sensor, s)
-    # Where a temperature is limited, one that cannot be read is too high.
+    # If the temperature is limited, an unreadable one counts as too high.
     if b.temperature < UNBOUNDED and not y.temperature <= b.temperature:
         stop(TEMPERATURE, y.temperature, s)
 
 
 def leaps(step: float, b: Any, s: Any) -> bool:
-    """Whether the clock does not increase, or by more than a sample that was answered in time; after a pause it may."""
+    """Whether the clock does not increase, or increases by more than a sample answered in time; allowed after a
+    pause."""
     return not step > 0.0 or (step > b.sample_time + b.answer and s.begun > 2.0)
 
 
 def watch_clock(y: Any, b: Any, s: Any) -> None:
-    """The rig's time advances, sample by sample."""
+    """Check that the rig's time advances, sample by sample."""
     step = y.time - s.time
     s.begun += 1.0
     if leaps(step, b, s):
@@ -202,7 +202,7 @@ def watch_clock(y: Any, b: Any, s: Any) -> None:
 
 
 def watch_standstill(y: Any, b: Any, s: Any) -> None:
-    """The position changes under a torque that must move the axis."""
+    """Check that the position changes under a torque that must move the axis."""
     if y.position != s.position:
         s.still = 0.0
         s.moving = b.standstill
@@ -228,12 +228,12 @@ def watch_standstill(y: Any, b: Any, s: Any) -> None:
 
 
 def differ(a: float, b: float) -> bool:
-    """Whether two readings differ; a sensor that the rig lacks reads NaN."""
+    """Whether two readings differ; a missing sensor reads NaN."""
     return a != b and (a == a or b == b)
 
 
 def watch_readings(y: Any, b: Any, s: Any) -> None:
-    """Some reading changes while the command does."""
+    """Check that some reading changes while the command does."""
     if abs(y.torque - s.motor) > 0.0:  # two numbers
         s.alive = 1.0
     if abs(y.sensor - s.sensor) > 0.0:
@@ -260,7 +260,8 @@ def watch_readings(y: Any, b: Any, s: Any) -> None:
 
 
 def watch_torque(y: Any, b: Any, s: Any) -> None:
-    """The measured torque follows the command, and the sensor has its direction where the motor drives the axis."""
+    """Check that the measured torque follows the command, and the sensor has its direction when the motor drives the
+    axis."""
     part = min(1.0, b.sample_time / b.answer)
     s.commanded += part * (s.torque - s.commanded)
     if abs(y.torque) < UNBOUNDED:
@@ -296,7 +297,7 @@ def watch_direction(b: Any, s: Any) -> None:
 
 
 def suspected(b: Any, s: Any) -> float:
-    """The possible cause if a limit is crossed now; the sample that crosses it is no part of the evidence."""
+    """Return the possible cause if a limit is crossed now; the sample that crosses it is not evidence."""
     enough = (SLID - 0.5) * b.sample_time
     if s.unlike > enough:
         return IGNORED
@@ -326,7 +327,7 @@ def watch_answer(y: Any, b: Any, s: Any) -> None:
         watch_readings(y, b, s)
         watch_torque(y, b, s)
         watch_direction(b, s)
-    # The times of a record increase, also after a clock that does not has become a reason to stop.
+    # The times of a record increase, even after a faulty clock has become a reason to stop.
     leapt = watched and s.started != 0.0 and leaps(y.time - s.time, b, s)
     s.time = s.time + b.sample_time if leapt else y.time
     s.started = 1.0
@@ -338,14 +339,14 @@ def watch_answer(y: Any, b: Any, s: Any) -> None:
 
 
 def idle(y: Any, w: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
-    """The loop is open: the controller watches, so that it can be closed at any sample. Returns no torque."""
+    """Run the controller in open loop, so the loop can be closed at any sample; return no torque."""
     follow(y.position, y.position, w.velocity, 0.0, w.torque, n, m, z, p, u)
     m.others = 0.0
     return 0.0
 
 
 def control(y: Any, w: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
-    """The controller's torque, N·m; one that takes over starts where the last command left the axis."""
+    """Return the controller's torque, N·m; one that takes over starts with the last command."""
     u.time = y.time
     if abs(y.temperature) < UNBOUNDED:
         u.temperature = y.temperature
@@ -357,7 +358,7 @@ def control(y: Any, w: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> f
 
 
 def ramp(b: Any, s: Any) -> None:
-    """One sample of the stop."""
+    """Return the torque of one sample of the stop."""
     if abs(s.torque) <= b.fall * (1.0 + 1e-9):
         s.torque = 0.0
         s.state = STOPPED
@@ -366,7 +367,7 @@ def ramp(b: Any, s: Any) -> None:
 
 
 def guarded(y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: Any) -> float:
-    """One sample of the loop: watch, control, and stop if there is reason to. Returns the torque command, N·m."""
+    """Run one sample of the loop: check, control, and stop if there is a reason; return the torque command, N·m."""
     if s.state == RUNNING:
         s.suspect = suspected(b, s)
     watch_motion(y, w, b, s)
@@ -390,5 +391,5 @@ def guarded(y: Any, w: Any, b: Any, s: Any, n: Any, m: Any, z: Any, p: Any, u: A
 
 
 def guarded_by(functions: Mapping[str, Callable[..., float]]) -> Callable[..., float]:
-    """`guarded` with the functions of a controller (`Controller.functions`)."""
+    """Return `guarded` with the functions of a controller (`Controller.functions`)."""
     return bound(guarded, {name: functions[name] for name in ("sample", "follow")})

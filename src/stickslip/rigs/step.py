@@ -1,4 +1,4 @@
-"""One guarded sample as the Python loop calls it: by addresses, and rehearsed before it counts."""
+"""One guarded sample as called by the Python loop: by addresses, and rehearsed before it is due."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from stickslip.rigs.loop_sample import ADDRESSES, COLUMNS, MEASURED, Control, ad
 from stickslip.rigs.rig import Setpoint
 
 SETPOINT, ROW = ((ADDRESSES.names or ()).index(name) for name in ("setpoint", "row"))
-"""Places of the addresses that change from sample to sample; by name they would take twice as long."""
+"""Indices of the addresses that change from sample to sample; by name they would take twice as long."""
 
 
 class Step:
@@ -22,9 +22,9 @@ class Step:
     def __init__(self, control: Control) -> None:
         self.control = control
         self._addresses = addresses(control)
-        self._sample = self._addresses.view(np.float64)  # as kernels take it
-        # The rehearsal works on copies that stand still on their setpoint. They live here, since only their
-        # addresses are used.
+        self._sample = self._addresses.view(np.float64)  # as kernels require it
+        # The rehearsal uses copies at rest at their setpoint. They are kept here, because only their addresses are
+        # used.
         self._copies = control._replace(
             **{name: getattr(control, name).copy() for name in control._fields[1:]}
         )
@@ -35,15 +35,15 @@ class Step:
         self._rehearsal = at.view(np.float64)
 
     def decide(self, setpoint: int, row: int) -> float:
-        """The torque for the next sample, N·m; `setpoint` and `row` are addresses."""
+        """Return the torque for the next sample, N·m; `setpoint` and `row` are addresses."""
         self._addresses[SETPOINT], self._addresses[ROW] = setpoint, row
         return decide_at(self._sample)
 
     def rehearse(self) -> None:
-        """Run the sample on copies: its code is then in the caches of the processor."""
+        """Run the sample on copies, which loads its code into the processor's caches."""
         decide_at(self._rehearsal)
         nothing_at(self._rehearsal)
 
     def idle(self) -> None:
-        """A compiled function that does nothing, called as the sample is: what calling and clock take."""
+        """Call a compiled function that does nothing, to measure call and clock."""
         nothing_at(self._sample)

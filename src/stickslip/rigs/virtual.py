@@ -1,7 +1,7 @@
-"""The virtual rig: a machine of `stickslip.machines` behind the protocol of `stickslip.rigs.rig`.
+"""The virtual rig: a machine of `stickslip.machines` with the interface of `stickslip.rigs.rig`.
 
-Its clock is its own: a sample passes when it is exchanged, and a pause advances the clock without stepping through it
-(friction drifts on, the contact cools). Blocks and single samples give the same numbers, bit for bit.
+It has its own clock: each exchange is one sample, and a pause advances the clock without simulating every sample
+(friction drifts, the contact cools). Blocks and single samples give the same numbers, bit for bit.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from stickslip.simulation.machine.step import sample
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TORQUE, SPEED = 1.0, 100.0
-"""N·m and rad/s, of a machine whose file limits neither."""
+"""Default limits, N·m and rad/s, if the machine's file has none."""
 SETTLE, LONGEST_SETTLE = 0.05, 2.0
-"""s, of which a pause steps through as many as the axis needs to come to rest."""
+"""Longest simulated part of a pause, s, in which the axis comes to rest."""
 AT_REST = 0.05
 """rad/s"""
 
 
 @kernel()
 def run_block(laid: Laid, control: Control, setpoints: Any, rows: Any) -> int:
-    """`stickslip.rigs.rig.BlockRig.exchange_block` on a machine; returns how many samples were run."""
+    """Run `stickslip.rigs.rig.BlockRig.exchange_block` on a machine; return the number of samples."""
     plant = plant_of(laid)
     for k in range(setpoints.shape[0]):
         torque = decide(control, setpoints[k], rows[k])
@@ -69,7 +69,7 @@ class VirtualRig:
 
     @property
     def name(self) -> str:
-        """The machine's, and what it goes without."""
+        """Name of the machine, and imperfections switched off."""
         off = self.machine.switched_off
         return f"virtual {self.machine.name}" + (f" without {', '.join(off)}" if off else "")
 
@@ -80,38 +80,38 @@ class VirtualRig:
 
     @property
     def limits(self) -> Limits:
-        """From the machine's file; the speed stays below that at which its encoder loses counts."""
+        """Limits of the machine's file; the speed is below that at which its encoder loses counts."""
         return self._limits
 
     @property
     def capabilities(self) -> Capabilities:
-        """A virtual machine cannot outlive its process, which serves as watchdog."""
+        """Capabilities: a virtual machine ends with its process, which serves as watchdog."""
         return Capabilities(
             Watchdog(self.sample_time, "the machine ends with its process"), False, True, True, True
         )
 
     def open(self) -> Measurement:
-        """Measure, with zero torque; a machine that was closed goes on where it stood."""
+        """Measure with zero torque; a machine that was closed continues from its state."""
         look(self.laid, self._row[0])
         return self._measured()
 
     def exchange(self, torque: float) -> Measurement:
-        """One sample with a torque, N·m."""
+        """Run one sample with a torque, N·m."""
         self._one[0] = torque
         run(self.laid, self._one, self._row)
         return self._measured()
 
     def exchange_block(self, control: Control, setpoints: Array, rows: Array) -> int:
-        """Samples of the loop, compiled."""
+        """Run samples of the loop, compiled."""
         return run_block(self.laid, control, setpoints, rows)
 
     def pause(self, seconds: float) -> Measurement:
-        """Zero torque until the axis rests, then the clock alone.
+        """Simulate zero torque until the axis rests, then advance the clock alone.
 
         Raises
         ------
         InputError
-            If `seconds` is no number of at least 0.
+            If `seconds` is negative or not finite.
         """
         if not (seconds >= 0.0 and math.isfinite(seconds)):
             raise InputError(f"pause: seconds = {seconds:g} must be a finite number of at least 0")
@@ -127,12 +127,12 @@ class VirtualRig:
         return self.open()
 
     def close(self) -> None:
-        """Nothing to disconnect; torque that was on its way is dropped."""
+        """Drop the torque in the delay line; there is nothing to disconnect."""
         self.laid.forget_commands()
 
     @property
     def speed(self) -> float:
-        """Of the friction disk, rad/s, as no sensor shows it."""
+        """True velocity of the friction disk, rad/s."""
         return abs(float(self.laid.axis[int(self.laid.machine["disk"]) + 1]))
 
     def _measured(self) -> Measurement:
@@ -140,7 +140,7 @@ class VirtualRig:
 
 
 def virtual_rig(name: str, without: Sequence[str] = ()) -> VirtualRig:
-    """The virtual rig of a machine by name or file, without some of its imperfections.
+    """Return the virtual rig of a machine by name or file, without some of its imperfections.
 
     Raises
     ------
@@ -150,7 +150,8 @@ def virtual_rig(name: str, without: Sequence[str] = ()) -> VirtualRig:
 
 
 def build(settings: Table) -> VirtualRig:
-    """From ``machine`` (a name of the library, or a file beside this one) and ``without`` (a list of imperfections)."""
+    """Build from ``machine`` (a name of the library, or a file next to this one) and ``without`` (a list of
+    imperfections)."""
     without = settings.texts("without", IMPERFECTIONS) if settings.has("without") else []
     name = settings.text("machine")
     return virtual_rig(str(settings.document.locate(name)) if name.endswith(".toml") else name, without)

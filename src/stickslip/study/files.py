@@ -1,9 +1,8 @@
-"""The files of a study's folder: records, metrics.csv, metrics.parquet, manifest.json and the copies of its inputs."""
+"""Read and write the files of a study's folder: records, metrics.csv, manifest.json and copies of the inputs."""
 
 from __future__ import annotations
 
 import csv
-import importlib
 import json
 import math
 import os
@@ -18,6 +17,7 @@ import numpy as np
 from stickslip.errors import InputError
 from stickslip.messages import ask_for_place
 from stickslip.record import Record
+from stickslip.study.parquet_table import write_parquet
 from stickslip.study.provenance import engine_hash, file_hash, versions
 from stickslip.study.result import Run
 from stickslip.whole_files import draft_of, prepared_folder, write_whole
@@ -31,8 +31,8 @@ KINDS = ("study", "sweep", "tune")
 MARK = ".stickslip-results"
 """File that says whose results a folder holds, from before the first of them"""
 PLACES = (
-    "manifest.json", "metrics.csv", "metrics.parquet", "summary.csv", "report.html", "results.jsonl", "*-tuned.json",
-    "*-tried.csv", "inputs", "figures", "records", "data", "variants",
+    "manifest.json", "metrics.csv", "metrics.parquet", "summary.csv", "cases.parquet", "report.html", "results.jsonl",
+    "*-tuned.json", "*-tried.csv", "inputs", "figures", "records", "data", "variants",
 )  # fmt: skip
 """Patterns of the names of results: what is there and is not ours is not overwritten"""
 
@@ -131,43 +131,20 @@ def metric_names(runs: Sequence[Run]) -> list[str]:
 
 
 def write_metrics(folder: Path, runs: Sequence[Run]) -> None:
-    """Write metrics.csv (exact decimals; empty where there is no number) and metrics.parquet, one row a run."""
+    """Write metrics.csv (exact decimals; NaN as an empty cell), with pyarrow also metrics.parquet; one row per run."""
     names = metric_names(runs)
     rows = [[getattr(run, key) for key in KEYS] + [_cell(run.metrics.get(n)) for n in names] for run in runs]
     with draft_of(folder / "metrics.csv") as draft, draft.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows([[*KEYS, *names], *rows])
-    _write_parquet(folder, runs, names)
+    columns: dict[str, np.ndarray[Any, Any]] = {
+        key: np.array([getattr(run, key) for run in runs], dtype=np.str_) for key in KEYS
+    }
+    columns |= {name: np.array([run.metrics.get(name, math.nan) for run in runs]) for name in names}
+    write_parquet(folder / "metrics.parquet", [columns])
 
 
 def _cell(value: float | None) -> str:
     return "" if value is None or math.isnan(value) else repr(float(value))
-
-
-def _write_parquet(folder: Path, runs: Sequence[Run], names: Sequence[str]) -> None:
-    pyarrow: Any = importlib.import_module("pyarrow")  # Any: it has no types.
-    parquet: Any = importlib.import_module("pyarrow.parquet")
-    columns = [_text_column(pyarrow, [getattr(run, key) for run in runs]) for key in KEYS]
-    columns += [_number_column(pyarrow, [run.metrics.get(name, math.nan) for run in runs]) for name in names]
-    with draft_of(folder / "metrics.parquet") as draft:
-        parquet.write_table(pyarrow.Table.from_arrays(columns, names=[*KEYS, *names]), draft)
-
-
-# From buffers, since `pyarrow.array` imports pandas wherever it is installed.
-
-
-def _text_column(pyarrow: Any, values: Sequence[str]) -> Any:
-    encoded = [value.encode() for value in values]
-    ends = np.cumsum([0, *(len(e) for e in encoded)]).astype(np.int32)
-    buffers = [None, pyarrow.py_buffer(ends), pyarrow.py_buffer(b"".join(encoded))]
-    return pyarrow.Array.from_buffers(pyarrow.string(), len(values), buffers)
-
-
-def _number_column(pyarrow: Any, values: Sequence[float]) -> Any:
-    """Doubles; NaN becomes null."""
-    numbers = np.array(values, dtype=np.float64)
-    known = np.packbits(~np.isnan(numbers), bitorder="little")
-    buffers = [pyarrow.py_buffer(known), pyarrow.py_buffer(numbers)]
-    return pyarrow.Array.from_buffers(pyarrow.float64(), numbers.size, buffers)
 
 
 # ---- the manifest -----------------------------------------------------------------------------------------------

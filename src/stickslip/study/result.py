@@ -84,7 +84,7 @@ class StudyResult:
     Attributes
     ----------
     folder : Path
-        Where metrics.csv, metrics.parquet, manifest.json and records/ lie.
+        Folder of metrics.csv, manifest.json and records/.
     runs : sequence of Run
         In the study's order: slip rule, reference, friction, controller.
     manifest : mapping

@@ -45,7 +45,7 @@ def run(
     progress: Progress | None = None,
     say: Callable[[str], None] | None = None,
 ) -> StudyResult:
-    """Run a study, or find its runs finished, and write metrics.csv, metrics.parquet, records/, manifest.json.
+    """Run a study, or find its runs finished, and write metrics.csv, records/ and manifest.json.
 
     A run is finished once its record lies in the folder with the fingerprint of the run; a second call does
     the rest. Tables, manifest and result hold every finished run of the study, those that earlier calls left in

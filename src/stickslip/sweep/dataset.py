@@ -1,16 +1,17 @@
-"""The data set of a sweep: one Parquet file a block, in folders named after the run's parts.
+"""Read and write the data set of a sweep: one `.npz` file per block, in folders named after the parts of the run.
 
-``DIR/data/slip_rule=signed/reference=low/friction=nominal/controller=PD/part-000000.parquet``: what pandas, Polars,
-DuckDB and pyarrow read as one table. A file is written aside and renamed, and holds the fingerprint of its numbers, so
-that an interrupted sweep finds what it has, whatever stopped it.
+``DIR/data/slip_rule=signed/reference=low/friction=nominal/controller=PD/part-000000.npz`` has one array per column. A
+file is written as a draft and then renamed, and contains the fingerprint of its numbers. An interrupted sweep therefore
+finds all finished blocks. Where pyarrow is installed, a finished sweep also has all cases in one table,
+``cases.parquet``.
 """
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
-from collections.abc import Sequence
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +19,17 @@ import numpy as np
 
 from stickslip.errors import InputError, unwritable
 from stickslip.messages import ask_for_place
+from stickslip.study.files import KEYS
+from stickslip.study.parquet_table import write_parquet
 from stickslip.study.planned_run import PlannedRun
 from stickslip.sweep.block import Block
 from stickslip.sweep.plan import Sweep
 from stickslip.whole_files import DRAFTS, draft_of
 
 OVERHEAD = 4000
-"""Bytes that a file of a block takes besides its rows."""
-KEY = b"stickslip"
+"""Bytes that the file of a block takes in addition to its rows."""
+ABOUT = "__about__"
+"""Array of a block's file with its fingerprint and size, as JSON."""
 
 
 def block_path(folder: Path, sweep: Sweep, run: int, start: int) -> Path:
@@ -33,12 +37,12 @@ def block_path(folder: Path, sweep: Sweep, run: int, start: int) -> Path:
     p = sweep.runs[run]
     parts = (f"slip_rule={p.slip_rule}", f"reference={p.reference}", f"friction={p.friction}",
              f"controller={p.controller}")  # fmt: skip
-    return folder.joinpath("data", *parts, f"part-{start // sweep.size_of(run):06d}.parquet")
+    return folder.joinpath("data", *parts, f"part-{start // sweep.size_of(run):06d}.npz")
 
 
 def _parts(folder: Path, sweep: Sweep, run: int) -> list[Path]:
     """The files of a run's blocks that are there, in order of their cases."""
-    return sorted(block_path(folder, sweep, run, 0).parent.glob("part-*.parquet"))
+    return sorted(block_path(folder, sweep, run, 0).parent.glob("part-*.npz"))
 
 
 def has_block(folder: Path, sweep: Sweep, run: int, start: int) -> bool:
@@ -59,11 +63,11 @@ def size_found(folder: Path, sweep: Sweep, run: int) -> int:
 
 
 def _about(path: Path) -> dict[str, Any]:
-    """What a file says of its block; nothing where it is missing, cut off or something else."""
-    parquet: Any = importlib.import_module("pyarrow.parquet")
+    """Return fingerprint and size of a block; nothing if the file is missing, cut off or something else."""
     try:
-        return dict(json.loads(parquet.read_schema(path).metadata[KEY]))
-    except (OSError, ValueError, KeyError, TypeError):
+        with np.load(path, allow_pickle=False) as data:
+            return dict(json.loads(str(data[ABOUT])))
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
         return {}
 
 
@@ -75,34 +79,48 @@ def keep_block(folder: Path, sweep: Sweep, block: Block) -> None:
     InputError
         If it cannot be written.
     """
-    pyarrow: Any = importlib.import_module("pyarrow")
-    parquet: Any = importlib.import_module("pyarrow.parquet")
     path = block_path(folder, sweep, block.run, block.start)
     n = len(block.numbers)
-    columns: dict[str, Any] = {"case": pyarrow.array(range(block.start, block.start + n), pyarrow.int64())}
-    columns |= {name: _numbers(pyarrow, block.numbers[:, i]) for i, name in enumerate(sweep.drawn.names)}
-    columns |= {name: _numbers(pyarrow, block.metrics[:, i]) for i, name in enumerate(sweep.metrics)}
-    columns["flagged"] = pyarrow.array(block.flagged.tolist(), pyarrow.bool_())
-    columns["failure"] = pyarrow.array(block.failures, pyarrow.string())
-    columns["integrator"] = pyarrow.array(block.integrators, pyarrow.string())
-    table = pyarrow.Table.from_arrays(list(columns.values()), names=list(columns))
-    about = json.dumps(
-        {"fingerprint": sweep.fingerprint(block.run), "size": sweep.size_of(block.run)}
-    ).encode()
+    columns: dict[str, Any] = {"case": np.arange(block.start, block.start + n)}
+    columns |= {name: block.numbers[:, i] for i, name in enumerate(sweep.drawn.names)}
+    columns |= {name: block.metrics[:, i] for i, name in enumerate(sweep.metrics)}
+    columns["flagged"] = block.flagged
+    columns["failure"] = np.array(block.failures, dtype=np.str_)
+    columns["integrator"] = np.array(block.integrators, dtype=np.str_)
+    about = {"fingerprint": sweep.fingerprint(block.run), "size": sweep.size_of(block.run)}
+    columns[ABOUT] = np.array(json.dumps(about))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise unwritable(path, error) from None
-    with draft_of(path) as draft:
-        parquet.write_table(table.replace_schema_metadata({KEY: about}), draft)
+    with draft_of(path) as draft, draft.open("wb") as file:
+        np.savez_compressed(file, **columns)
 
 
-def _numbers(pyarrow: Any, values: Any) -> Any:
-    """Doubles; NaN becomes null."""
-    found = np.ascontiguousarray(values, dtype=np.float64)
-    known = np.packbits(~np.isnan(found), bitorder="little")
-    buffers = [pyarrow.py_buffer(known.tobytes()), pyarrow.py_buffer(found)]
-    return pyarrow.Array.from_buffers(pyarrow.float64(), found.size, buffers)
+def write_cases(folder: Path, sweep: Sweep) -> bool:
+    """Write all cases of all runs to cases.parquet, one row per case, if pyarrow is installed.
+
+    Returns
+    -------
+    bool
+        Whether it was written.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    return write_parquet(folder / "cases.parquet", _tables(folder, sweep))
+
+
+def _tables(folder: Path, sweep: Sweep) -> Iterator[Mapping[str, Any]]:
+    """Columns of each block: the parts of the run, then those of its file."""
+    for i, run in enumerate(sweep.runs):
+        for path in _parts(folder, sweep, i):
+            with np.load(path, allow_pickle=False) as data:
+                columns = {name: data[name] for name in data.files if name != ABOUT}
+            n = len(columns["case"])
+            yield {key: np.full(n, getattr(run, key)) for key in KEYS} | columns
 
 
 def clear_drafts(folder: Path) -> None:
@@ -120,7 +138,7 @@ def refuse_strays(folder: Path, sweep: Sweep) -> None:
     """
     own = {block_path(folder, sweep, *b): sweep.fingerprint(b[0]) for b in sweep.blocks}
     strays = [
-        path for path in sorted((folder / "data").rglob("part-*.parquet"))
+        path for path in sorted((folder / "data").rglob("part-*.npz"))
         if path not in own or fingerprint_of(path) not in (own[path], None)
     ]  # fmt: skip
     if strays:
@@ -164,8 +182,7 @@ def read(
 
 def rows_of(folder: Path, sweep: Sweep, run: int) -> int:
     """Cases that a run's files hold."""
-    parquet: Any = importlib.import_module("pyarrow.parquet")
-    return sum(parquet.read_metadata(path).num_rows for path in _parts(folder, sweep, run))
+    return sum(_read_part(path, ["case"])["case"].size for path in _parts(folder, sweep, run))
 
 
 def read_block(
@@ -177,6 +194,5 @@ def read_block(
 
 
 def _read_part(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
-    parquet: Any = importlib.import_module("pyarrow.parquet")
-    table = parquet.ParquetFile(path).read(columns=list(columns))
-    return {name: table.column(name).to_numpy().astype(np.float64) for name in columns}
+    with np.load(path, allow_pickle=False) as data:
+        return {name: data[name].astype(np.float64) for name in columns}

@@ -108,6 +108,7 @@ def run(
             done += len(block.numbers)
             progress(done, sweep.cases)
         check()
+    dataset.write_cases(folder, sweep)
     timings = {
         "wall_s": time.perf_counter() - clock, "cpu_s": time.process_time() - cpu, "jobs": jobs,
         "blocks_computed": len(missing), "blocks_found": found,

@@ -50,7 +50,7 @@ class SweepResult:
     manifest : mapping
         What was run, with which versions, and how long it took.
     files : tuple of Path
-        The summary, the manifest and the figures.
+        The summary, the manifest, with the extra `parquet` the table of all cases, and the figures.
     """
 
     sweep: Sweep
@@ -182,6 +182,7 @@ def sweep(
     if why := too_few(planned.drawn):
         tell(why)
     files = [write_summary(out, planned, rows), out / "manifest.json"]
+    files += [table for table in [out / "cases.parquet"] if table.exists()]
     if figures:
         from stickslip.report.sweep_pictures import draw
 

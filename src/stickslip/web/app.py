@@ -1,4 +1,4 @@
-"""The page's server as an ASGI application: its addresses, and what each answers."""
+"""The page's server as an ASGI application with its routes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ STATIC = Path(__file__).with_name("static")
 
 @dataclass(frozen=True)
 class Options:
-    """How a server is run.
+    """Options of a server.
 
     Attributes
     ----------
@@ -35,12 +35,12 @@ class Options:
         Folder of the projects.
     token : str
     hosts : sequence of str
-        As `stickslip.web.security.Gate` takes them.
+        As for `stickslip.web.security.Gate`.
     cookie : str
     max_upload : int
         Bytes.
     jobs : int
-        How many long jobs run at a time.
+        Number of parallel long jobs.
     """
 
     projects: Path
@@ -52,7 +52,7 @@ class Options:
 
 
 def make_app(options: Options) -> Gate:
-    """The application.
+    """Return the application.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def make_app(options: Options) -> Gate:
 
     @asynccontextmanager
     async def lifespan(_app: Starlette) -> AsyncGenerator[None]:
-        # After the page itself is out: the first job comes later than the first picture.
+        # After the page has been sent, because the first job starts later than the first picture.
         asyncio.get_running_loop().call_later(1.0, site.jobs.prepare)
         yield
         await site.close()
@@ -73,7 +73,7 @@ def make_app(options: Options) -> Gate:
 
 
 def routes(site: Site, options: Options) -> list[BaseRoute]:
-    """Every address."""
+    """Return all routes."""
     from stickslip.web import bench, exporting, identifying, logs, projects_api, rigs, sent
 
     tables = [part.table(site) for part in (logs, identifying, sent, exporting, rigs, projects_api)]
@@ -89,13 +89,13 @@ def routes(site: Site, options: Options) -> list[BaseRoute]:
 
 
 def session(options: Options) -> Handler:
-    """What turns the token into a cookie."""
+    """Exchange the token for a cookie."""
 
     async def handler(request: Request) -> Response:
         given = text(await body(request), "token")
         if not security.same(given, options.token):
             raise Refused(
-                401, "this token is not this server's; open the address that `stickslip web` printed"
+                401, "this token belongs to another server; open the address that `stickslip web` printed"
             )
         answer = JSONResponse({"ok": True})
         answer.set_cookie(options.cookie, options.token, httponly=True, samesite="strict", path="/")
@@ -105,10 +105,10 @@ def session(options: Options) -> Handler:
 
 
 async def index(_request: Request) -> Response:
-    """The page."""
+    """Return the page."""
     return Response((STATIC / "index.html").read_bytes(), media_type="text/html")
 
 
 async def nothing_there(_request: Request) -> Response:
-    """What an unknown address gets."""
+    """Answer an unknown address."""
     raise Refused(404, "there is nothing at this address")

@@ -1,4 +1,4 @@
-"""What a request holds, checked: JSON of a bounded size, texts, numbers. What is wrong is one line and a status."""
+"""Check the content of requests: JSON of limited size, texts, numbers. Errors are one line and a status."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOST_JSON = 2**20
 
 
 class Refused(Exception):
-    """A request that is answered with a status of its own."""
+    """A request that is refused with a status."""
 
     def __init__(self, status: int, message: str) -> None:
         super().__init__(message)
@@ -29,7 +29,7 @@ class Refused(Exception):
 
 
 def answered(handler: Handler) -> Handler:
-    """The handler, whose errors become answers of one line."""
+    """Return the handler, with its errors as answers of one line."""
 
     async def answer(request: Request) -> Response:
         try:
@@ -43,22 +43,22 @@ def answered(handler: Handler) -> Handler:
         except StickslipError as error:
             return complaint(422, error)
         except ClientDisconnect:
-            return complaint(400, "the connection was closed before all of it had come")
+            return complaint(400, "the connection was closed before the upload was complete")
         except Exception as error:
-            # What went wrong is for whoever runs the server; the page learns that something did.
+            # The details are printed for the owner of the server; the page only learns that there was an error.
             print(f"stickslip: {type(error).__name__}: {error}", file=sys.stderr)
-            return complaint(500, "this failed inside stickslip; the terminal says why")
+            return complaint(500, "internal error of stickslip; see the terminal")
 
     return answer
 
 
 def complaint(status: int, what: object) -> JSONResponse:
-    """An error as the page shows it."""
+    """Return an error for the page."""
     return JSONResponse({"error": " ".join(str(what).split())}, status)
 
 
 async def body(request: Request) -> dict[str, Any]:
-    """The request's JSON, an object.
+    """Return the request's JSON object.
 
     Raises
     ------
@@ -70,7 +70,7 @@ async def body(request: Request) -> dict[str, Any]:
     async for chunk in request.stream():
         content += chunk
         if len(content) > MOST_JSON:
-            raise Refused(413, f"a request of more than {MOST_JSON} bytes is not taken")
+            raise Refused(413, f"the request is larger than {MOST_JSON} bytes")
     try:
         data: Any = json.loads(content or b"{}")
     except (ValueError, RecursionError):
@@ -81,7 +81,7 @@ async def body(request: Request) -> dict[str, Any]:
 
 
 def text(data: dict[str, Any], key: str, default: str | None = None) -> str:
-    """A text of the request.
+    """Return a text of the request.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def text(data: dict[str, Any], key: str, default: str | None = None) -> str:
 
 
 def number(value: object, name: str) -> float:
-    """A finite number.
+    """Return a finite number of the request.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def number(value: object, name: str) -> float:
 
 
 def chosen_names(value: object, name: str, allowed: tuple[str, ...] | None = None) -> list[str]:
-    """A list of texts, each one of those that are allowed.
+    """Return a list of allowed texts.
 
     Raises
     ------
@@ -122,5 +122,5 @@ def chosen_names(value: object, name: str, allowed: tuple[str, ...] | None = Non
     if len(items) > 100 or not all(isinstance(v, str) for v in items):
         raise Refused(400, f"{name} must be a list of texts")
     if allowed is not None and (odd := [v for v in items if v not in allowed]):
-        raise Refused(400, f"{name}: {odd[0][:80]!r} is none of {', '.join(allowed)}")
+        raise Refused(400, f"{name}: {odd[0][:80]!r} is not one of {', '.join(allowed)}")
     return items

@@ -1,4 +1,4 @@
-"""The workbench's simulations: one warm process, and the addresses that ask it."""
+"""Simulations of the workbench: one warm process, and its routes."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from stickslip.web.asking import Refused, Table, body
 from stickslip.web.jobs import ended, last_of, started
 
 PATIENCE = 400.0
-"""s that a simulation may take, a first one that compiles too"""
+"""Time limit of a simulation, s, including the first one, which compiles"""
 
 
 class Bench:
-    """A process that simulates one case after the other."""
+    """A process that simulates one case after another."""
 
     def __init__(self) -> None:
         self._process: asyncio.subprocess.Process | None = None
@@ -26,12 +26,12 @@ class Bench:
         self._complaints: asyncio.Task[str] | None = None
 
     async def simulate(self, case: dict[str, Any]) -> dict[str, Any]:
-        """Channels and metrics of a case.
+        """Return channels and metrics of a case.
 
         Raises
         ------
         Refused
-            With what is wrong about it.
+            With the error in the case.
         """
         async with self._turn:
             process = await self._running()
@@ -48,7 +48,7 @@ class Bench:
                 if isinstance(error, TimeoutError):
                     wrong = f"it timed out after {PATIENCE:.0f} s"
             except asyncio.CancelledError:
-                await self.close()  # its answer would be taken for the next one's
+                await self.close()  # its answer would be mistaken for that of the next case
                 raise
             if not line:
                 await self.close()
@@ -73,7 +73,7 @@ class Bench:
 
 
 def table(bench: Bench) -> Table:
-    """Handlers by method and path."""
+    """Return handlers by method and path."""
     from stickslip.web import cases
 
     async def forms(_request: Request) -> Response:

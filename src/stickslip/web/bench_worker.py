@@ -1,4 +1,4 @@
-"""A process that stays warm and simulates one case after the other: a line of JSON in, a line of JSON out."""
+"""A process that stays warm and simulates one case after another: a line of JSON in, a line of JSON out."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def main() -> int:
     os.dup2(2, 1)
     warnings.simplefilter("ignore")
     for line in sys.stdin:
-        # A folder for each: this process is ended from outside, and would leave one that it keeps.
+        # A folder for each case: this process is terminated from outside and would leave a permanent one behind.
         with tempfile.TemporaryDirectory(prefix="stickslip-") as folder:
             answer = answered(json.loads(line), Path(folder) / "case.toml")
         channel.write(json.dumps(plain(answer), ensure_ascii=False, allow_nan=False) + "\n")
@@ -33,7 +33,7 @@ def main() -> int:
 
 
 def answered(request: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """What came of a case, or why nothing did."""
+    """Return the result of a case, or the reason for none."""
     from stickslip.web.cases import toml_of
 
     try:
@@ -41,12 +41,13 @@ def answered(request: Mapping[str, Any], path: Path) -> dict[str, Any]:
         return simulated(path)
     except StickslipError as error:
         return {"error": " ".join(str(error).replace(str(path), "the case").split())}
-    except Exception as error:  # one case must not end the process that the next one waits for
+    except Exception as error:  # one case must not end the process needed for the next
         return {"error": f"this failed ({type(error).__name__}: {' '.join(str(error).split())[:300]})"}
 
 
 def simulated(path: Path) -> dict[str, Any]:
-    """Channels, thinned for a picture, and metrics of a `stickslip simulate` file, as that verb computes them."""
+    """Return channels, thinned for a picture, and metrics of a `stickslip simulate` file, as computed by that
+    command."""
     from stickslip.study.study import execute, load_run
 
     planned = load_run(path)

@@ -1,4 +1,5 @@
-"""A closed loop as the workbench's forms say it: as a file of `stickslip simulate`, as Python, as forms to fill in."""
+"""Convert a closed loop from the workbench's forms to a file of `stickslip simulate` and to Python, and describe the
+forms."""
 
 from __future__ import annotations
 
@@ -14,17 +15,17 @@ PARTS = {
     "bandwidth_hz": "Hz", "damping": "-", "sample_time": "s", "encoder_counts": "counts a revolution",
     "torque_limit": "N·m", "gain": "-", "lead": "s", "deadband": "rad/s", "filter_hz": "Hz",
 }  # fmt: skip
-"""Numbers of a controller, with their units."""
+"""Parameters of a controller, with their units."""
 OWN = ("gain", "lead", "deadband", "filter_hz")
-"""Of them, those of the compensator."""
+"""Those of the compensator."""
 LINEAR = ("PD", "PID", "PR")
 COMPENSATORS = ("feedforward", "feedback")
 LONGEST = 120.0
-"""s that a run of the workbench may last"""
+"""Longest run of the workbench, s"""
 
 
 def descriptions() -> dict[str, Any]:
-    """Laws and references with every parameter: unit, symbol, meaning, bounds, an example."""
+    """Return laws and references with every parameter: unit, symbol, meaning, bounds, an example."""
     laws = [plugins.law(name) for name in plugins.law_names()]
     kinds = [plugins.reference_kind(name) for name in plugins.reference_names()]
     return {
@@ -35,13 +36,13 @@ def descriptions() -> dict[str, Any]:
 
 
 def described(thing: Described) -> dict[str, Any]:
-    """A law's or a reference's parameters as a form needs them."""
+    """Return the parameters of a law or reference for a form."""
     title = str(getattr(thing, "title", "")) or thing.name
     return {"name": thing.name, "title": title, "fields": [field_of(f) for f in thing.fields]}
 
 
 def field_of(f: Field) -> dict[str, Any]:
-    """One parameter."""
+    """Return one parameter for a form."""
     finite = {k: v for k, v in (("lower", f.par.lower), ("upper", f.par.upper)) if math.isfinite(v)}
     return {
         "name": f.name, "unit": f.par.unit, "symbol": f.par.symbol, "meaning": f.par.meaning, "list": f.per_element,
@@ -53,12 +54,12 @@ def field_of(f: Field) -> dict[str, Any]:
 
 
 def tables_of(case: Mapping[str, Any]) -> dict[str, Any]:
-    """The tables of a `stickslip simulate` file.
+    """Return the tables of a `stickslip simulate` file.
 
     Raises
     ------
     InputError
-        If a law, reference or number is none; the file's own reader says the rest.
+        If a law, reference or number is invalid; other errors are found by the file's own reader.
     """
     friction, believed = part(case, "friction"), part(case, "believed")
     reference, controller = part(case, "reference"), part(case, "controller")
@@ -87,7 +88,7 @@ def tables_of(case: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def part(case: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """A part of the case, which must be a table."""
+    """Return a part of the case, which must be a table."""
     found: Any = case.get(name)
     found = {} if found is None else found
     if not isinstance(found, dict):
@@ -96,7 +97,7 @@ def part(case: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def chosen(table: Mapping[str, Any], key: str, allowed: Any) -> str:
-    """A word, one of those allowed: no path, no file."""
+    """Return one of the allowed words, never a path or file."""
     value = table.get(key)
     if not isinstance(value, str) or value not in allowed:
         raise InputError(f"{key} must be one of {', '.join(allowed)}")
@@ -104,18 +105,18 @@ def chosen(table: Mapping[str, Any], key: str, allowed: Any) -> str:
 
 
 def law_table(table: Mapping[str, Any]) -> dict[str, Any]:
-    """The law's name and parameters."""
+    """Return the law's name and parameters."""
     return {"law": chosen(table, "law", plugins.law_names()), **values_in(table, ("law",))}
 
 
 def values_in(table: Mapping[str, Any], without: tuple[str, ...]) -> dict[str, Any]:
-    """Numbers and lists of numbers by name."""
+    """Return numbers and lists of numbers by name."""
     out: dict[str, Any] = {}
     for name, value in table.items():
         if name in without or value is None:
             continue
         if not name.isidentifier():
-            raise InputError(f"{name[:40]!r} is no name of a parameter")
+            raise InputError(f"{name[:40]!r} is not the name of a parameter")
         several: list[Any] = cast("list[Any]", value) if isinstance(value, list) else [value]
         if len(several) > 1000 or not all(is_number(v) for v in several):
             raise InputError(f"{name} must be a finite number, or a list of them")
@@ -124,7 +125,7 @@ def values_in(table: Mapping[str, Any], without: tuple[str, ...]) -> dict[str, A
 
 
 def numbers_in(table: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, float]:
-    """The numbers of these names that are given."""
+    """Return the given numbers with these names."""
     found = values_in({name: table.get(name) for name in names}, ())
     if any(isinstance(v, list) for v in found.values()):
         raise InputError(f"{', '.join(names)} must be numbers")
@@ -132,7 +133,7 @@ def numbers_in(table: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, fl
 
 
 def is_number(value: object) -> bool:
-    """Whether it is a finite number."""
+    """Whether a value is a finite number."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
 
 
@@ -140,7 +141,7 @@ def is_number(value: object) -> bool:
 
 
 def toml_of(case: Mapping[str, Any]) -> str:
-    """A file that `stickslip simulate` runs to the same numbers.
+    """Return a file with which `stickslip simulate` gives the same numbers.
 
     Raises
     ------
@@ -152,7 +153,7 @@ def toml_of(case: Mapping[str, Any]) -> str:
 
 
 def python_of(case: Mapping[str, Any]) -> str:
-    """A program that runs to the same numbers.
+    """Return a program that gives the same numbers.
 
     Raises
     ------
@@ -182,10 +183,10 @@ for name, value in record.meta["metrics"].items():
 
 
 def model_text(table: Mapping[str, Any]) -> str:
-    """A model in Python."""
+    """Return a model as Python code."""
     return f"ss.Model({table['law']!r}{arguments({k: v for k, v in table.items() if k != 'law'})})"
 
 
 def arguments(values: Mapping[str, Any]) -> str:
-    """Further arguments of a call."""
+    """Return further arguments of a call as Python code."""
     return "".join(f", {name}={value!r}" for name, value in values.items())

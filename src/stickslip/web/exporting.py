@@ -1,4 +1,4 @@
-"""Addresses of exports: the targets with what each carries, and archives to download."""
+"""Routes of exports: the targets with their content, and archives to download."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stickslip.web.site import Site
 
 
 def table(site: Site) -> Table:
-    """Handlers by method and path."""
+    """Return handlers by method and path."""
 
     async def targets(_request: Request) -> Response:
         return JSONResponse({"targets": await asyncio.to_thread(described)})
@@ -51,7 +51,7 @@ def table(site: Site) -> Table:
 
 
 def model_behind(project: Project, setting: Item) -> Item | None:
-    """The model that a setting was made for; None where it has been deleted since."""
+    """Return the model of a setting; None if it has been deleted."""
     try:
         return project.item("models", setting.about.get("model"))
     except NotThere:
@@ -59,7 +59,7 @@ def model_behind(project: Project, setting: Item) -> Item | None:
 
 
 def described() -> list[dict[str, Any]]:
-    """Every target: what it is, what it carries, what it asks for."""
+    """Return all targets with description, content and settings."""
     from stickslip.export import CONTROLLER_TARGETS, TARGETS, target_named
 
     out: list[dict[str, Any]] = []
@@ -73,7 +73,7 @@ def described() -> list[dict[str, Any]]:
 
 
 def asked(project: Project, data: dict[str, Any]) -> tuple[Item, str, dict[str, Any]]:
-    """What is exported, and how.
+    """Return the item to export and its settings.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def asked(project: Project, data: dict[str, Any]) -> tuple[Item, str, dict[str, 
         item = project.item("models", data.get("model"))
         path = item.folder / "model.toml"
     if not path.is_file():
-        raise Refused(409, f"{item.about.get('name')} holds nothing to export")
+        raise Refused(409, f"{item.about.get('name')} contains nothing to export")
     if data.get("nearest") is True:
         options["nearest"] = True
     if data.get("top_speed") not in (None, ""):

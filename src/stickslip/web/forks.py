@@ -1,8 +1,8 @@
-"""Processes for jobs, forked from one that has loaded what jobs need: none spends a second of work on imports.
+"""Fork processes for jobs from one that has done its imports, which take a second.
 
-On Linux alone; elsewhere a job's process is started from nothing. The server tells the first process over a socket to
-fork, and hands over what becomes the new one's stdin, stdout and stderr; that one writes a line of JSON when it has,
-and one with the exit code when a process of its has ended. It ends when the server does.
+This is for Linux only; elsewhere a job's process is started normally. The server sends a request to fork over a socket,
+with the stdin, stdout and stderr of the new process. The first process answers with a line of JSON, and with another
+one with the exit code when a forked process has ended. It ends with the server.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ POSSIBLE = sys.platform == "linux"
 
 @dataclass(eq=False)
 class Forked:
-    """A process of a job: what `asyncio.subprocess.Process` has, as far as jobs use it."""
+    """A process of a job, with the part of `asyncio.subprocess.Process` that jobs use."""
 
     pid: int
     stdin: asyncio.StreamWriter
@@ -34,13 +34,13 @@ class Forked:
     gone: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def wait(self) -> int:
-        """The exit code, when it has ended."""
+        """Wait for the end and return the exit code."""
         await self.gone.wait()
         assert self.returncode is not None
         return self.returncode
 
     def terminate(self) -> None:
-        """Ask it to end."""
+        """Request its end."""
         if self.returncode is None:
             os.kill(self.pid, signal.SIGTERM)
 
@@ -50,7 +50,7 @@ class Forked:
             os.kill(self.pid, signal.SIGKILL)
 
     def ended(self, code: int) -> None:
-        """Note that it has ended."""
+        """Set its exit code."""
         self.returncode = code
         self.stdin.close()
         self.gone.set()
@@ -58,7 +58,7 @@ class Forked:
 
 @dataclass(frozen=True)
 class Ends:
-    """The server's ends of what will be a process's stdin, stdout and stderr."""
+    """The server's ends of a process's stdin, stdout and stderr."""
 
     stdin: asyncio.StreamWriter
     stdout: asyncio.StreamReader
@@ -67,15 +67,15 @@ class Ends:
 
 
 class Forks:
-    """A process to fork from, and those that were.
+    """A process to fork from, and the forked ones.
 
     Parameters
     ----------
     command : list of str
-        Starts a process that calls `serve`.
+        Command of a process that calls `serve`.
     environment : dict of str to str
     longest : int
-        Bytes of a line that a process may write.
+        Longest line that a process may write, bytes.
     """
 
     def __init__(self, command: list[str], environment: dict[str, str], longest: int) -> None:
@@ -89,7 +89,7 @@ class Forks:
         self._running: dict[int, Forked] = {}
 
     async def prepare(self) -> socket.socket:
-        """Start the process to fork from, unless it runs. Returns the socket that it hears."""
+        """Start the process to fork from, unless it is running; return its socket."""
         async with self._turn:
             if self._link is None:
                 ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -103,7 +103,7 @@ class Forks:
             return self._link
 
     async def forked(self) -> Forked:
-        """A new process.
+        """Return a new process.
 
         Raises
         ------
@@ -132,21 +132,21 @@ class Forks:
         return await answer
 
     async def close(self) -> None:
-        """End the process to fork from; those that were forked go on."""
+        """End the process to fork from; the forked ones continue."""
         if self._link is not None:
             self._link.close()
         if self._hearing is not None:
             await self._hearing
 
     async def _read(self, pipe: int) -> asyncio.StreamReader:
-        """A stream of what comes out of a pipe."""
+        """Return a stream of the output of a pipe."""
         reader = asyncio.StreamReader(limit=self._longest)
         file = os.fdopen(pipe, "rb", buffering=0)
         await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), file)
         return reader
 
     async def _hear(self, first: asyncio.subprocess.Process) -> None:
-        """Note what the process to fork from says, to its end."""
+        """Process the messages of the process to fork from, until it ends."""
         assert first.stdout is not None
         async for text in first.stdout:
             line: dict[str, int] = json.loads(text)
@@ -155,7 +155,7 @@ class Forks:
                 process = Forked(line["pid"], ends.stdin, ends.stdout, ends.stderr)
                 self._running[process.pid] = process
                 if ends.answer.cancelled():
-                    process.stdin.close()  # nobody will give it a job: it ends
+                    process.stdin.close()  # it will not get a job: end it
                 else:
                     ends.answer.set_result(process)
             else:
@@ -175,7 +175,7 @@ class Forks:
 
 
 async def orphan_ended(process: Forked) -> None:
-    """End a process whose exit code nobody will tell, and wait until it has."""
+    """End a process whose exit code will not be reported, and wait for its end."""
     loop, gone = asyncio.get_running_loop(), asyncio.Event()
     with suppress(ProcessLookupError):
         watched = os.pidfd_open(process.pid)
@@ -191,8 +191,8 @@ async def orphan_ended(process: Forked) -> None:
 
 
 def serve() -> None:
-    """Fork whenever the server says so. Returns in every process that was forked; ends this one with the server."""
-    gc.freeze()  # what was loaded stays in memory that all of them share
+    """Fork on request of the server. Return in every forked process; end this one with the server."""
+    gc.freeze()  # loaded modules stay in memory shared by all processes
     link, answers = socket.socket(fileno=os.dup(0)), os.fdopen(os.dup(1), "w", encoding="ascii")
     poll, running = select.poll(), dict[int, int]()
     poll.register(link, select.POLLIN)
@@ -223,8 +223,8 @@ def serve() -> None:
 
 
 def begun(ends: Iterable[int], others: Iterable[int]) -> None:
-    """In a process that was just forked: its own group, stdin, stdout and stderr; the rest is closed."""
-    os.setpgid(0, 0)  # as the first one does, so that it is one before either goes on
+    """Set up a forked process: its own group, stdin, stdout and stderr; close everything else."""
+    os.setpgid(0, 0)  # as in the parent, so it is set before either continues
     for place, end in enumerate(ends):
         os.dup2(end, place)
     for descriptor in (*ends, *others):

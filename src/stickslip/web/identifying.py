@@ -1,4 +1,4 @@
-"""Addresses of what is computed from logs and models: identification, recommendation, comparison."""
+"""Routes of computations from logs and models: identification, recommendation, comparison."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from stickslip.web.sent import ask_again
 from stickslip.web.site import Site
 
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
-"""A report is a page of its own: its styles stand in it, and nothing in it runs."""
+"""A report is a separate page with its own styles and without scripts."""
 
 
 def table(site: Site) -> Table:
-    """Handlers by method and path."""
+    """Return handlers by method and path."""
     return {**computing(site), **files(site)}
 
 
 def begin(
     site: Site, project: Project, item: Item, kind: str, title: str, request: dict[str, Any], model: Item | None = None,
 ) -> Response:  # fmt: skip
-    """Start the job that makes an item, and keep in the item what came of it; `model` is what it is made from."""
+    """Start the job that creates an item from `model`, and store its result in the item."""
 
     def finish(job: Job) -> None:
         if item.folder.is_dir():
@@ -41,7 +41,7 @@ def begin(
 
 
 def computing(site: Site) -> Table:
-    """What is computed: each begins a job."""
+    """Return the routes that start a job."""
 
     async def identify(request: Request) -> Response:
         project, data = site.project(request), await body(request)
@@ -88,7 +88,7 @@ def computing(site: Site) -> Table:
 
 
 def files(site: Site) -> Table:
-    """What was computed, as files; and the laws to choose among."""
+    """Return the routes of result files, and of the candidate laws."""
 
     async def report(request: Request) -> Response:
         kind = request.path_params["kind"]
@@ -120,7 +120,7 @@ def files(site: Site) -> Table:
 
 
 def logs_named(project: Project, data: dict[str, Any]) -> list[Item]:
-    """The logs to identify from, each of which has been read.
+    """Return the logs to identify from, all of which have been read.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def logs_named(project: Project, data: dict[str, Any]) -> list[Item]:
 
 
 def laws_to_identify() -> list[dict[str, str]]:
-    """The laws that say a torque at constant velocity, which identification chooses among."""
+    """Return the candidate laws of identification: those with a torque at constant velocity."""
     from stickslip import plugins
 
     laws = [plugins.law(name) for name in plugins.law_names()]
@@ -144,7 +144,7 @@ def laws_to_identify() -> list[dict[str, str]]:
 
 
 def whole_model(project: Project, identifier: object) -> Item:
-    """The model of that identifier, which has a whole law.
+    """Return the model with an identifier, which must have a complete law.
 
     Raises
     ------
@@ -152,14 +152,14 @@ def whole_model(project: Project, identifier: object) -> Item:
     """
     model = project.item("models", identifier)
     if model.about.get("state") == "asks":
-        raise Refused(409, f"{model.about.get('name')} names code that nobody has allowed; read it first")
+        raise Refused(409, f"{model.about.get('name')} names code that is not approved; review it first")
     if not (model.folder / "model.toml").is_file():
-        raise Refused(409, f"{model.about.get('name')} has no whole law; identify one first")
+        raise Refused(409, f"{model.about.get('name')} has no complete law; identify one first")
     return model
 
 
 def identify_options(data: dict[str, Any]) -> dict[str, Any]:
-    """Options of `stickslip.identify`, as the form says them.
+    """Return options of `stickslip.identify` from the form.
 
     Raises
     ------
@@ -185,7 +185,7 @@ def identify_options(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def recommend_options(data: dict[str, Any]) -> dict[str, Any]:
-    """Options of `stickslip.recommend`, as the form says them.
+    """Return options of `stickslip.recommend` from the form.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Long work in processes of its own: started, watched, cancelled. What a job said is kept, so that a reload sees it."""
+"""Run long jobs in separate processes: start, watch, cancel. Their output is kept for a reload of the page."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ Process = asyncio.subprocess.Process | Forked
 
 LONGEST_LINE = 64 * 2**20
 KEPT = 200
-"""Finished jobs that are remembered."""
+"""Most finished jobs that are kept."""
 WAITING = 40
-"""Jobs that may wait for their turn."""
+"""Most waiting jobs."""
 GRACE = 3.0
-"""s after which a job that was asked to end is ended; a rig that moves has more (`Job.grace`)."""
+"""Time from a request to end until a job is killed, s; longer for a moving rig (`Job.grace`)."""
 
 
 @dataclass
@@ -39,11 +39,11 @@ class Job:
     state : str
         "waiting", "running", "done", "failed" or "cancelled".
     said : list of dict
-        Every line so far, each with its number and time.
+        All lines so far, each with its number and time.
     result : dict
-        What came of it.
+        The result.
     settled : bool
-        Whether `finish` has been called: what came of it is kept.
+        Whether `finish` has been called, so the result is stored.
     """
 
     id: str
@@ -68,22 +68,22 @@ class Job:
 
     @property
     def ended(self) -> bool:
-        """Whether nothing more is to come."""
+        """Whether it has ended."""
         return self.state in ("done", "failed", "cancelled")
 
     @property
     def over(self) -> bool:
-        """Whether it has ended and its process, which may take its time about it, is gone."""
+        """Whether it has ended and its process, which may take longer, is gone."""
         return self.ended and (self.process is None or self.process.returncode is not None)
 
     def say(self, **line: Any) -> None:
-        """Add a line and wake those who listen."""
+        """Add a line and wake the listeners."""
         self.said.append({"n": len(self.said) + 1, "s": round(time.time() - self.began, 2), **line})
         self.changed.set()
         self.changed = asyncio.Event()
 
     def about(self) -> dict[str, Any]:
-        """What the page shows of it."""
+        """Return its description for the page."""
         last = next((line["tell"] for line in reversed(self.said) if "tell" in line), "")
         return {
             "id": self.id, "kind": self.kind, "title": self.title, "state": self.state, "item": self.item,
@@ -91,7 +91,7 @@ class Job:
         }  # fmt: skip
 
     async def lines(self, after: int = 0) -> AsyncIterator[dict[str, Any] | None]:
-        """What it says from line `after` on, to its end; None every 15 s, so that a dead listener is noticed."""
+        """Yield its lines from `after` to the end; None every 15 s, so a dead listener is detected."""
         while True:
             changed = self.changed
             while after < len(self.said):
@@ -106,7 +106,7 @@ class Job:
 
 
 def worker_command(module: str = "stickslip.web.worker") -> tuple[list[str], dict[str, str]]:
-    """Command and environment of a process of our own that finds what this one finds."""
+    """Return command and environment of a process with the import path of this one."""
     paths = os.pathsep.join(p or os.getcwd() for p in sys.path)
     threads = {name: os.environ.get(name, "1") for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
     return [sys.executable, "-P", "-m", module], {**os.environ, **threads, "PYTHONPATH": paths}
@@ -118,7 +118,7 @@ class Jobs:
     Parameters
     ----------
     most : int
-        How many run at a time; others wait. Reading and small things have a place of their own.
+        Number of parallel long jobs; others wait. Short jobs do not wait for them.
     """
 
     def __init__(self, most: int = 2) -> None:
@@ -135,35 +135,35 @@ class Jobs:
         short: bool = False, limit: float = float("inf"), finish: Callable[[Job], None] | None = None,
         grace: float = GRACE, meanwhile: Callable[[dict[str, Any]], None] | None = None,
     ) -> Job:  # fmt: skip
-        """Begin a job, or let it wait for its turn.
+        """Start a job, or queue it.
 
         Parameters
         ----------
         project : Project
         kind, title : str
         request : mapping
-            What the worker reads; ``task`` names what it does. The files that it opens are those of the project.
+            Request to the worker; ``task`` names the task. It opens only files of the project.
         item : str
-            Identifier of what it makes.
+            Identifier of the item that it creates.
         short : bool
-            Whether it goes past those that take long.
+            Whether it is short and overtakes long ones.
         limit : float
-            s, after which it is ended unless it has shown something.
+            Time limit without any output, s.
         finish : callable, optional
-            Is called when it has ended.
+            Called at its end.
         grace : float
-            s that its process has to end in order once it was asked to.
+            Time for an orderly end after a request, s.
         meanwhile : callable, optional
-            Is called with what can be shown before the end.
+            Called with intermediate results.
 
         Raises
         ------
         InputError
-            If too many wait.
+            If too many jobs wait.
         """
         waiting = sum(not job.ended for job in self._jobs.values())
         if waiting >= WAITING:
-            raise InputError(f"{waiting} jobs run or wait; let some of them end, or cancel them")
+            raise InputError(f"{waiting} jobs are running or waiting; wait for some of them, or cancel them")
         name = f"job-{secrets.token_hex(6)}"
         request = {**request, "project": str(project.folder)}
         job = Job(name, project.id, kind, title, request, limit, finish, item, grace, meanwhile)
@@ -175,7 +175,7 @@ class Jobs:
         return job
 
     def find(self, project: str, identifier: str) -> Job:
-        """The job of that identifier in a project.
+        """Return the job with an identifier in a project.
 
         Raises
         ------
@@ -183,23 +183,23 @@ class Jobs:
         """
         job = self._jobs.get(identifier)
         if job is None or job.project != project:
-            raise NotThere("no such job; the server may have been started anew since")
+            raise NotThere("no such job; the server may have been restarted")
         return job
 
     def works_on(self, item: str) -> bool:
-        """Whether a job on an item runs or waits, or what came of it is not kept yet."""
+        """Whether a job on an item is running or waiting, or its result is not stored yet."""
         return any(job.item == item and not job.settled for job in self._jobs.values())
 
     def of(self, project: str) -> list[Job]:
-        """The jobs of a project, the oldest first."""
+        """Return the jobs of a project, oldest first."""
         return [job for job in self._jobs.values() if job.project == project]
 
     def all(self) -> list[Job]:
-        """The jobs of every project, the oldest first."""
+        """Return the jobs of all projects, oldest first."""
         return list(self._jobs.values())
 
     async def cancel(self, job: Job) -> None:
-        """End a job; what it wrote so far stays."""
+        """End a job; its files so far are kept."""
         if job.ended:
             return
         job.state = "cancelled"
@@ -208,7 +208,7 @@ class Jobs:
         job.say(end="cancelled")
 
     async def close(self) -> None:
-        """End all of them."""
+        """End all jobs."""
         self._closed = True
         if self._spare is not None:
             await ended(await self._spare)
@@ -235,13 +235,13 @@ class Jobs:
             if job.finish is not None:
                 job.finish(job)
         except (InputError, OSError) as error:  # a full disk, or a folder that is gone
-            job.state, job.error = "failed", f"what came of it cannot be kept ({error})"
+            job.state, job.error = "failed", f"the result cannot be stored ({error})"
         job.settled = True
         if not was_cancelled:
             job.say(end=job.state, error=job.error, result=job.result)
 
     async def _work(self, job: Job) -> None:
-        """Run the process of a job to its end."""
+        """Run the process of a job until it ends."""
         job.state, job.began = "running", time.time()
         try:
             async with asyncio.timeout(None if job.limit == float("inf") else job.limit) as job.clock:
@@ -249,13 +249,13 @@ class Jobs:
         except TimeoutError:
             job.error = f"timed out after {job.limit:.0f} s"
         except Exception as error:
-            job.error = f"its process could not be run ({error})"
+            job.error = f"its process could not be started ({error})"
         finally:
             if job.process is not None:
                 await ended(job.process, job.grace)
 
     def prepare(self) -> None:
-        """Start a process that has loaded what the next job needs, so that its imports are not waited for."""
+        """Start a process in advance that has done the imports for the next job."""
         if self._closed:
             return
         if self._forks is not None:
@@ -275,7 +275,7 @@ class Jobs:
         return process if process.returncode is None else await started()
 
     async def _listen(self, job: Job) -> None:
-        """Give the job to a process and hear it to its end."""
+        """Send the job to a process and read its output until it ends."""
         process = job.process = await self._process()
         if job.ended:
             return
@@ -298,7 +298,7 @@ class Jobs:
             elif "shown" in line:
                 if job.meanwhile is not None:
                     job.meanwhile(line["shown"])
-                if job.clock is not None:  # the file has been read: what follows is our own work
+                if job.clock is not None:  # the file has been read: the rest is our own work
                     job.clock.reschedule(None)
                 job.say(shown=True)
             else:
@@ -312,7 +312,7 @@ class Jobs:
 
 
 async def started(*module: str) -> asyncio.subprocess.Process:
-    """A process that waits for a job, or of another module."""
+    """Start a process that waits for a job, or one of another module."""
     command, environment = worker_command(*module)
     return await asyncio.create_subprocess_exec(
         *command, env=environment, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
@@ -321,7 +321,7 @@ async def started(*module: str) -> asyncio.subprocess.Process:
 
 
 async def last_of(stream: asyncio.StreamReader) -> str:
-    """The last line of a stream, which is read to its end so that nobody waits for it."""
+    """Return the last line of a stream, which is read to its end, so the writer is not blocked."""
     tail = b""
     while chunk := await stream.read(65536):
         tail = (tail + chunk)[-2000:]
@@ -330,7 +330,7 @@ async def last_of(stream: asyncio.StreamReader) -> str:
 
 
 async def ended(process: Process, grace: float = GRACE) -> None:
-    """End a process: asked first, then without asking, its own processes too."""
+    """End a process and its children: terminate, then kill."""
     if process.returncode is not None:
         return
     with suppress(ProcessLookupError):

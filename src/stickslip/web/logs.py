@@ -1,4 +1,4 @@
-"""Addresses of logs: they come as files, are read by a worker, and their samples go out as numbers."""
+"""Routes of logs: upload of files, reading by a worker, and samples as numbers."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NUMBERS = (
 
 
 def table(site: Site) -> Table:
-    """Handlers by method and path."""
+    """Return handlers by method and path."""
 
     async def add(request: Request) -> Response:
         project = site.project(request)
@@ -93,17 +93,17 @@ def table(site: Site) -> Table:
 
 
 def read_again(site: Site, project: Project, item: Item) -> Job:
-    """Let a worker read a log as its description now says.
+    """Start a worker that reads a log with its current options.
 
     Raises
     ------
     Refused
-        If its file is gone.
+        If its file is missing.
     """
     about = item.about
     file = item.folder / str(about.get("file", ""))
     if not file.is_file():
-        raise Refused(409, f"the file of {about['name']} is gone; drop it again")
+        raise Refused(409, f"the file of {about['name']} is missing; drop it again")
     size = file.stat().st_size
     request = {
         "task": "read", "folder": str(item.folder), "file": file.name, "name": about["name"],
@@ -132,7 +132,7 @@ def read_again(site: Site, project: Project, item: Item) -> Job:
 
 
 def channels_of(given: str, count: int) -> list[int]:
-    """Places of channels, "0,2"; all where none are named.
+    """Return indices of channels, such as "0,2"; all by default.
 
     Raises
     ------
@@ -142,12 +142,12 @@ def channels_of(given: str, count: int) -> list[int]:
         return list(range(count))
     places = [int(p) if re.fullmatch(r"\d{1,4}", p) else count for p in given.split(",")][:64]
     if any(p >= count for p in places):
-        raise Refused(400, f"channels must be places from 0 to {count - 1}")
+        raise Refused(400, f"channels must be indices from 0 to {count - 1}")
     return places
 
 
 def reading_of(data: dict[str, Any]) -> dict[str, Any]:
-    """How a log is to be read, as the form says it.
+    """Return the options for reading a log from the form.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def reading_of(data: dict[str, Any]) -> dict[str, Any]:
     out: dict[str, Any] = {}
     mapping: Any = data.get("map", {})
     if not isinstance(mapping, dict) or len(cast("dict[str, Any]", mapping)) > 50:
-        raise Refused(400, "map must say a column for each channel")
+        raise Refused(400, "map must have a column for each channel")
     columns = cast("dict[str, Any]", mapping)
     out["map"] = {k: text(columns, k) for k in columns if columns[k] not in ("", None)}
     for name in (*NUMBERS, "start", "end"):

@@ -1,4 +1,4 @@
-"""Projects: folders with logs, models and settings. Names that people gave stand in files, and are never paths.
+"""Projects: folders with logs, models and settings. Names given by people are stored in files and never used as paths.
 
 PROJECT/project.json                      name, when it was made
 PROJECT/logs/log-ID/about.json            name of the file, how it was read, what the doctor found
@@ -8,9 +8,9 @@ PROJECT/settings/setting-ID/about.json, result.json, recommended.toml
 PROJECT/studies/study-ID/about.json, result.json, study.toml, out/, report.html
 PROJECT/rigs/rig-ID/about.json, rig.toml, and what it names
 
-A project may come from somebody else, so its JSON states facts about its data and nothing else: which code may run is
-kept per user (`stickslip.approval`), whether a rig is real is read from its file when it is armed, whether a job runs
-is known from the jobs of this server, and no link leads out of it.
+A project may come from somebody else, so its JSON contains only facts about its data. Approvals of code are kept per
+user (`stickslip.approval`), whether a rig is real is read from its file when it is armed, whether a job is running is
+known from the jobs of this server, and links that lead out of a project are refused.
 """
 
 from __future__ import annotations
@@ -31,43 +31,43 @@ from stickslip.errors import InputError
 from stickslip.whole_files import prepared_folder, write_whole
 
 KINDS = {"logs": "log", "models": "model", "settings": "setting", "studies": "study", "rigs": "rig"}
-"""What a project holds, and how the identifiers of each begin."""
+"""Kinds of items, and the prefixes of their identifiers."""
 PROJECT_ID = re.compile(r"\d{4}-\d{2}-\d{2}-[0-9a-f]{8}")
 LONGEST_NAME = 120
 UPLOAD = re.compile(r"upload\.[a-z0-9]{1,8}|live\.stream")
-"""Names of the file of a log: ours, whatever the file was called."""
+"""Names of the file of a log, independent of its original name."""
 KNOWN: Mapping[str, type] = {
     "name": str, "state": str, "problem": str, "file": str, "model": str, "law": str, "verdict": str, "rig": str,
     "sentence": str, "size": int, "rows": int, "readable": bool, "real": bool, "reading": dict, "view": dict,
     "limits": dict, "asks": dict, "options": dict, "chosen": object, "columns": list, "findings": list, "facts": list,
     "sent": list, "logs": list,
 }  # fmt: skip
-"""Type of each value of an item's JSON; values of another type are left out."""
+"""Type of each value of an item's JSON; values of other types are ignored."""
 EMPTY: Mapping[str, Mapping[str, Any]] = {"rigs": {"facts": [], "sent": []}, "studies": {"sent": []}}
-"""Defaults that the page needs, by kind of item; a model without `sent` was identified here."""
+"""Defaults for the page, by kind of item; a model without `sent` was identified here."""
 
 
 class NotThere(InputError):
-    """There is no such project, or nothing of that identifier in it."""
+    """There is no such project or item."""
 
 
 def words(name: object, otherwise: str) -> str:
-    """A name as people gave it, without what does not print; `otherwise` where nothing is left."""
+    """Return a name without unprintable characters; `otherwise` if it is empty."""
     kept = "".join(c if c.isprintable() else " " for c in str(name))
     return " ".join(kept.split())[:LONGEST_NAME] or otherwise
 
 
 def written_whole(path: Path, data: Mapping[str, Any]) -> None:
-    """Write JSON so that a reader sees the file before or after, never half of it."""
+    """Write JSON atomically: a reader gets the old or the new file."""
     write_whole(path, json.dumps(data, ensure_ascii=False, allow_nan=False), "projects")
 
 
 def read_whole(path: Path) -> dict[str, Any]:
-    """Return what `written_whole` wrote; empty if there is nothing of the kind. NaN becomes None."""
+    """Read the JSON of `written_whole`; empty if there is none. NaN becomes None."""
     try:
-        if not path.is_file():  # a pipe would never end
+        if not path.is_file():  # reading a pipe would never end
             return {}
-        # Half of a pair of surrogates, which JSON can spell, is no text that can be sent to the page.
+        # An unpaired surrogate, which JSON can contain, cannot be sent to the page.
         text = path.read_text(encoding="utf-8")
         found: Any = json.loads(text, parse_constant=lambda _: None)
         if "\\ud" in text.lower():
@@ -85,12 +85,12 @@ def refuse_links(folder: Path, root: Path, shallow: bool = False) -> None:
     folder : Path
     root : Path
     shallow : bool
-        Whether what is inside of the folder is left alone.
+        Whether the content of the folder is not checked.
 
     Raises
     ------
     InputError
-        That names the link.
+        Names the link.
     """
     real = Path(os.path.realpath(root))
     inside = (
@@ -107,7 +107,7 @@ def refuse_links(folder: Path, root: Path, shallow: bool = False) -> None:
 
 
 def digest_of(code: str) -> str:
-    """Return the SHA-256 of code as it is shown, which is what `stickslip.approval` knows it by."""
+    """Return the SHA-256 of code as it is shown, for `stickslip.approval`."""
     return hashlib.sha256(code.encode()).hexdigest()
 
 
@@ -124,7 +124,7 @@ class Item:
 
     @property
     def about(self) -> dict[str, Any]:
-        """Facts about the item, without values of the wrong type."""
+        """Facts about the item, without values of a wrong type."""
         found = read_whole(self.folder / "about.json")
         kept = {k: v for k, v in found.items() if k not in KNOWN or isinstance(v, KNOWN[k])}
         if not UPLOAD.fullmatch(kept.get("file", "upload.dat")):
@@ -134,19 +134,19 @@ class Item:
         if isinstance(name, str) and isinstance(code, str):
             kept["asks"] = {"name": words(name, "code"), "text": code, "sha256": digest_of(code)}
         elif kept.get("state") == "asks":
-            kept |= {"state": "failed", "problem": "its code is not kept; delete it and drop its files again"}
+            kept |= {"state": "failed", "problem": "its code is missing; delete it and drop its files again"}
         empty = EMPTY.get(self.folder.parent.name, {})
         return {**empty, **kept, "id": self.id, "name": words(kept.get("name", ""), self.id)}
 
     def update(self, **changes: Any) -> dict[str, Any]:
-        """Change what is known of it. Returns all of it."""
+        """Update its facts; return all of them."""
         said = {**self.about, **changes}
         written_whole(self.folder / "about.json", said)
         return said
 
     @property
     def result(self) -> dict[str, Any]:
-        """What a job found."""
+        """Result of its job."""
         return read_whole(self.folder / "result.json")
 
 
@@ -163,11 +163,11 @@ class Project:
 
     @property
     def name(self) -> str:
-        """As people gave it."""
+        """The name given by people."""
         return words(read_whole(self.folder / "project.json").get("name", ""), self.id)
 
     def add(self, kind: str, **about: Any) -> Item:
-        """Make room for a log, model or setting."""
+        """Create the folder of a log, model or setting."""
         folder = self.folder / kind / f"{KINDS[kind]}-{secrets.token_hex(4)}"
         folder.mkdir(parents=True)
         item = Item(folder)
@@ -175,7 +175,7 @@ class Project:
         return item
 
     def item(self, kind: str, identifier: object) -> Item:
-        """The log, model or setting of that identifier.
+        """Return the log, model or setting with an identifier.
 
         Raises
         ------
@@ -192,14 +192,14 @@ class Project:
         raise NotThere(f"no such {word or 'thing'} in this project; it may have been deleted")
 
     def items(self, kind: str) -> list[Item]:
-        """All of a kind, the oldest first."""
+        """Return all items of a kind, oldest first."""
         found = [
             Item(f) for f in (self.folder / kind).glob(f"{KINDS[kind]}-*") if (f / "about.json").is_file()
         ]
         return sorted(found, key=lambda item: (str(item.about.get("made", "")), item.id))
 
     def free_name(self, kind: str, name: str) -> str:
-        """The name, with a number behind it where something of the kind has it already."""
+        """Return the name, with a number if another item of the kind has it."""
         taken = {item.about.get("name") for item in self.items(kind)}
         numbered = (f"{name} ({n})" for n in range(2, len(taken) + 3))
         return name if name not in taken else next(n for n in numbered if n not in taken)
@@ -220,7 +220,7 @@ class Projects:
     Parameters
     ----------
     folder : Path
-        It is made.
+        Created if missing.
 
     Raises
     ------
@@ -233,7 +233,7 @@ class Projects:
         prepared_folder(folder, "projects")
 
     def add(self, name: object = "") -> Project:
-        """A new project."""
+        """Create a project."""
         folder = self.folder / f"{datetime.now(UTC):%Y-%m-%d}-{secrets.token_hex(4)}"
         folder.mkdir()
         said = words(name, f"Project of {datetime.now():%d %B %Y, %H:%M}")
@@ -241,13 +241,13 @@ class Projects:
         return Project(folder)
 
     def find(self, identifier: object) -> Project:
-        """The project of that identifier.
+        """Return the project with an identifier.
 
         Raises
         ------
         NotThere
         InputError
-            If a link in its place leads elsewhere.
+            If its folder is a link to another place.
         """
         if isinstance(identifier, str) and PROJECT_ID.fullmatch(identifier):
             folder = self.folder / identifier
@@ -259,7 +259,7 @@ class Projects:
         raise NotThere("no such project; it may have been moved or deleted")
 
     def all(self) -> list[dict[str, Any]]:
-        """Identifier, name and how much each holds, the newest first."""
+        """Return identifier, name and number of items of each project, newest first."""
         out: list[dict[str, Any]] = []
         for path in sorted(self.folder.glob("*/project.json"), reverse=True):
             if not PROJECT_ID.fullmatch(path.parent.name):
@@ -271,5 +271,5 @@ class Projects:
 
 
 def now() -> str:
-    """This second, in UTC."""
+    """Return the current time in UTC, to the second."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")

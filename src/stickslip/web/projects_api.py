@@ -1,4 +1,4 @@
-"""Addresses of projects and jobs."""
+"""Routes of projects and jobs."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from stickslip.web.site import Site
 
 
 def table(site: Site) -> Table:
-    """Handlers by method and path."""
+    """Return handlers by method and path."""
     return {**projects(site), **items(site), **jobs(site)}
 
 
 def projects(site: Site) -> Table:
-    """All projects, and each as a whole."""
+    """Return the routes of all projects, and of one."""
 
     async def all_projects(_request: Request) -> Response:
         return JSONResponse({"projects": site.projects.all(), "folder": str(site.projects.folder)})
@@ -40,7 +40,7 @@ def projects(site: Site) -> Table:
 
 
 def items(site: Site) -> Table:
-    """Logs, models, settings and studies of a project."""
+    """Return the routes of logs, models, settings and studies of a project."""
 
     async def about(request: Request) -> Response:
         item = site.item(request, known_kind(request))
@@ -62,7 +62,7 @@ def items(site: Site) -> Table:
 
 
 def jobs(site: Site) -> Table:
-    """The jobs of a project: what each says, and its end."""
+    """Return the routes of a project's jobs: their output and cancelling."""
 
     def found(request: Request) -> Job:
         return site.jobs.find(site.project(request).id, request.path_params["job"])
@@ -88,7 +88,7 @@ def jobs(site: Site) -> Table:
 
 
 def known_kind(request: Request) -> str:
-    """Logs, models, settings, ... as the path says.
+    """Return the kind of item in the path.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def known_kind(request: Request) -> str:
 
 
 def events(job: Job, after: int) -> Response:
-    """What a job says, as server-sent events; a page that was reloaded asks for what came since."""
+    """Stream the output of a job as server-sent events; a reloaded page requests the missing ones."""
 
     async def stream() -> AsyncIterator[bytes]:
         async for line in job.lines(after):

@@ -1,7 +1,7 @@
-"""What a worker does with rigs: a look at a file that was sent, the plan of a procedure, and its run.
+"""Tasks of a worker on rigs: inspect an uploaded file, plan a procedure, and run it.
 
-A rig is a machine of the library, which is simulated, or the ``rig.toml`` of an item of the project; the code that such
-a file names runs if this user has approved it.
+A rig is a machine of the library, which is simulated, or the ``rig.toml`` of an item of the project; code that such a
+file names runs only if this user has approved it.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ MAIN = "rig.toml"
 
 
 def described(path: Path) -> dict[str, Any]:
-    """What the page shows of a rig's file before anything is connected.
+    """Return the description of a rig's file for the page, before anything is connected.
 
     Raises
     ------
     InputError
-        If it is no rig, or one that the page does not run.
+        If it is not a rig, or one that the page does not support.
     CodeRefused
-        If it names code that was not approved.
+        If it names code that is not approved.
     """
     rig = rig_at(path)
     table = tomllib.loads(path.read_text(encoding="utf-8"))["rig"]
@@ -49,7 +49,7 @@ def described(path: Path) -> dict[str, Any]:
 
 
 def within(limits: Limits) -> str:
-    """The limits for people; those that are infinite are left out."""
+    """Return the finite limits as text."""
     said = [(limits.text(name), LIMIT_UNITS[name], name) for name in ("torque", "speed")]
     low, high = limits.position
     if low > -float("inf") or high < float("inf"):
@@ -66,18 +66,18 @@ def within(limits: Limits) -> str:
 
 
 def sentence(kind: str, rig: Rig, where: str) -> str:
-    """What has to be understood before such a rig is armed; empty for one that is simulated."""
+    """Return the statement to confirm before a rig is armed; empty for a simulated one."""
     if kind == "virtual":
         return ""
     if kind == "replay":
-        return f"This plays a record back: {rig.name} moves nothing, and answers no command"
+        return f"This replays a record: {rig.name} moves nothing and ignores commands"
     named = f"{rig.name} on {where}" if where else rig.name
     most = f"{rig.limits.torque:g} N·m and {rig.limits.speed:g} rad/s"
     return f"This moves a real machine: {named}, with up to {most}; its emergency stop is at hand"
 
 
 def rig_at(path: Path) -> Rig:
-    """The rig of a file, not yet open; in messages the files beside it have their plain names.
+    """Return the rig of a file, not yet open; messages use plain names of the files in its folder.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def rig_at(path: Path) -> Rig:
         rig = read_rig(path)
         if rig.capabilities.watchdog is None:
             raise InputError(
-                f"{rig.name} declares no watchdog: nothing would take its torque away if this process died; give it "
+                f"{rig.name} declares no watchdog: nothing would remove its torque if this process died; give it "
                 "one (the page arms no rig without)"
             )
     return rig
@@ -97,7 +97,7 @@ def rig_at(path: Path) -> Rig:
 
 @contextmanager
 def plainly(folder: Path) -> Generator[None]:
-    """Files of the folder by their names alone, in what is refused."""
+    """Shorten paths in the folder to names in error messages."""
     try:
         yield
     except InputError as error:
@@ -106,7 +106,7 @@ def plainly(folder: Path) -> Generator[None]:
 
 
 def rig_plan(request: Request, say: Said) -> dict[str, Any]:
-    """What a procedure will do on a rig: nothing moves."""
+    """Return the plan of a procedure on a rig; nothing moves."""
     from stickslip.rigs.procedures.base import planned
 
     chosen, rig = procedure_on(request)
@@ -128,14 +128,14 @@ def facts_of(request: Request) -> dict[str, Any]:
 
 
 def rig_run(request: Request, say: Said) -> dict[str, Any]:
-    """Perform a procedure in the time of a clock; every sample is in the stream as it comes."""
+    """Perform a procedure in real time; every sample is streamed immediately."""
     from stickslip.rigs.procedures.base import perform
 
     folder = Path(request["folder"])
     if facts_of(request)["sentence"] != request["understood"]:
-        raise InputError("the file of the rig was changed since its plan was made; make the plan again")
+        raise InputError("the file of the rig has changed since it was planned; plan again")
     chosen, rig = procedure_on(request)
-    say({"tell": "making ready: nothing moves yet"})
+    say({"tell": "preparing: nothing moves yet"})
     stream = folder / "live.stream"
     done = perform(chosen, rig, path=stream, progress=lambda label: say({"tell": label}), realtime=True)
     done.record.save(folder / "upload.npz")
@@ -143,7 +143,7 @@ def rig_run(request: Request, say: Said) -> dict[str, Any]:
 
 
 def procedure_on(request: Request) -> tuple[Any, Rig]:
-    """The procedure with its options, and the rig."""
+    """Return the procedure with its options, and the rig."""
     from stickslip.rigs.procedures import procedure
     from stickslip.rigs.virtual import virtual_rig
 

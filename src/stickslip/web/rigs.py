@@ -1,7 +1,7 @@
-"""Addresses of the rig view: a plan before anything moves, a run that lives only as long as its page looks at it.
+"""Routes of the rig view: a plan before anything moves, and a run that continues only while its page is open.
 
-The page says every half second that it is there. Where it does not, or where the connection of its live signals ends,
-the run is asked to end: the loop ramps the torque to zero in the rig's own time, as it does for any signal.
+The page sends a sign of life every half second. Without it, or if the connection of its live signals ends, the run is
+stopped: the loop ramps the torque to zero in the rig's own time, as for any signal.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from stickslip.web.sent import LOOK, MAIN, ask_again, started
 from stickslip.web.site import Site
 
 PATIENCE = 4.0
-"""s without a sign of life from the page, after which the rig is stopped"""
+"""Time without a sign of life from the page after which the rig is stopped, s"""
 FRAME = 0.04
-"""s from one frame of live signals to the next, beside the time that a frame takes: more than 20 in a second"""
+"""Pause between two frames of live signals, s: more than 20 frames per second"""
 SHOWN = ("position", "position_reference", "velocity", "torque_command", "motor_torque")
 KILLED = 9
-"""The signal that ends a process which did not end when it was asked to"""
+"""The signal that kills a process that did not end on request"""
 GRACE = 10.0
-"""s beside the rig's own time for its ramp, after which a run that was asked to end is ended"""
+"""Time in addition to the rig's ramp after which a stopped run is killed, s"""
 VIRTUAL: dict[str, Any] = {"sentence": "", "real": False, "limits": dict[str, float]()}
 """Facts about a machine of the library."""
 MOST = 25
-"""Rows of a frame, of each stretch one"""
+"""Most rows of a frame, one per interval"""
 
 
 class Watch:
-    """Stops every run whose page is gone.
+    """Stops every run whose page is closed.
 
     Parameters
     ----------
@@ -51,19 +51,19 @@ class Watch:
         self._tasks: set[asyncio.Task[None]] = set()
 
     def begin(self, job: Job) -> None:
-        """Watch over a run."""
+        """Start to watch a run."""
         self._seen[job.id] = time.monotonic()
         task = asyncio.create_task(self._watch(job))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
     def alive(self, job: Job) -> None:
-        """Its page is there."""
+        """Note a sign of life of its page."""
         if job.id in self._seen:
             self._seen[job.id] = time.monotonic()
 
     def gone(self, job: Job) -> None:
-        """Its page is not there any more."""
+        """Note that its page is closed."""
         if not job.ended:
             self._seen[job.id] = float("-inf")
 
@@ -76,13 +76,13 @@ class Watch:
 
 
 def table(site: Site) -> Table:
-    """Handlers by method and path."""
+    """Return handlers by method and path."""
     watch = Watch(site)
     return {**beginning(site, watch), **running(site, watch)}
 
 
 def beginning(site: Site, watch: Watch) -> Table:
-    """What there is, a plan, and the start of a run."""
+    """Return the routes of rigs and procedures, a plan, and the start of a run."""
 
     async def rigs(_request: Request) -> Response:
         return JSONResponse(await asyncio.to_thread(described))
@@ -103,7 +103,7 @@ def beginning(site: Site, watch: Watch) -> Table:
         asked, rig = asked_of(project, data)
         said = await facts_now(site, project, rig) if rig else VIRTUAL
         if said["sentence"] and data.get("understood") != said["sentence"]:
-            raise Refused(409, f"{said['sentence']}: this has to be confirmed before the rig is armed")
+            raise Refused(409, f"{said['sentence']}: confirm this before the rig is armed")
         refuse_second(site, project, real=said["real"])
         on = rig.about["name"] if rig else asked["machine"]
         name = project.free_name("logs", f"{asked['procedure']} on {on}")
@@ -126,12 +126,12 @@ def beginning(site: Site, watch: Watch) -> Table:
 
 
 def running(site: Site, watch: Watch) -> Table:
-    """Signs of life of the page, and the live signals."""
+    """Return the routes of signs of life and of the live signals."""
 
     def found(request: Request) -> Job:
         job = site.jobs.find(site.project(request).id, request.path_params["job"])
         if job.kind != "rig":
-            raise Refused(404, "this job is no run of a rig")
+            raise Refused(404, "this job is not a run of a rig")
         return job
 
     async def alive(request: Request) -> Response:
@@ -159,7 +159,7 @@ def running(site: Site, watch: Watch) -> Table:
 
 
 def described() -> dict[str, Any]:
-    """Machines of the library, and the procedures with their options."""
+    """Return the machines of the library, and the procedures with their options."""
     from dataclasses import fields
 
     from stickslip.machines.files import library, machine
@@ -174,25 +174,23 @@ def described() -> dict[str, Any]:
 
 
 async def facts_now(site: Site, project: Project, rig: Item) -> dict[str, Any]:
-    """Return what the file of a rig states at this moment, read by a worker, whatever the project keeps of it.
+    """Return the current facts in the file of a rig, read by a worker, independent of the project's JSON.
 
     Raises
     ------
     Refused
-        If it is none that can be run.
+        If it cannot be run.
     """
-    job = started(site, project, rig, LOOK, f"Looking at {rig.about['name']}", short=True)
+    job = started(site, project, rig, LOOK, f"Reading {rig.about['name']}", short=True)
     async for _ in job.lines():
         pass
     if job.state != "done" or job.result.get("state") != "ready":
-        raise Refused(
-            409, job.error or "this rig cannot be run as it is; open it in the project, which says why"
-        )
+        raise Refused(409, job.error or "this rig cannot be run; open it in the project to see why")
     return job.result
 
 
 def refuse_second(site: Site, project: Project, real: bool) -> None:
-    """One rig at a time in a project, and one real one in all of them: two might be the same machine.
+    """Refuse a second rig in a project, and a second real one in all projects, because both might be the same machine.
 
     Raises
     ------
@@ -200,13 +198,13 @@ def refuse_second(site: Site, project: Project, real: bool) -> None:
     """
     moving = [job for job in site.jobs.all() if job.kind == "rig" and not job.over]
     if any(job.project == project.id for job in moving):
-        raise Refused(409, "the rig runs already; stop it first")
+        raise Refused(409, "the rig is already running; stop it first")
     if real and any(job.request["real"] for job in moving):
-        raise Refused(409, "a real rig runs already in another project; stop it first")
+        raise Refused(409, "a real rig is already running in another project; stop it first")
 
 
 def written(value: Any) -> str:
-    """An option's value as people write it."""
+    """Return an option's value as text."""
     return (
         ",".join(f"{x:g}" for x in cast("tuple[float, ...]", value))
         if isinstance(value, tuple)
@@ -215,9 +213,9 @@ def written(value: Any) -> str:
 
 
 def asked_of(project: Project, data: dict[str, Any]) -> tuple[dict[str, Any], Item | None]:
-    """Rig, procedure and options as the worker takes them, and the project's item if the rig is one.
+    """Return rig, procedure and options for the worker, and the project's item if the rig is one.
 
-    A machine and a procedure are of those that there are, a rig is an item of the project; no option is a path.
+    Machine and procedure must be registered, a rig must be an item of the project, and no option may be a path.
 
     Raises
     ------
@@ -236,13 +234,13 @@ def asked_of(project: Project, data: dict[str, Any]) -> tuple[dict[str, Any], It
     given = cast("dict[str, Any]", options)
     out = {name: text(given, name)[:200] for name in given if given[name] not in ("", None)}
     if odd := [name for name in ("controller", "model") if out.get(name)]:
-        raise Refused(400, f"{odd[0]} names a file, which the page does not take; use the command line")
+        raise Refused(400, f"{odd[0]} names a file, which the page does not support; use the command line")
     file = str(rig.folder / MAIN["rigs"]) if rig else ""
     return {"machine": machine, "rig": file, "procedure": procedure, "options": out}, rig
 
 
 def rig_of(project: Project, data: dict[str, Any]) -> Item | None:
-    """The rig of the project that is asked for; None where a machine of the library is.
+    """Return the requested rig of the project; None for a machine of the library.
 
     Raises
     ------
@@ -252,12 +250,12 @@ def rig_of(project: Project, data: dict[str, Any]) -> Item | None:
         return None
     rig = project.item("rigs", data["rig"])
     if rig.about.get("state") != "ready":
-        raise Refused(409, "this rig cannot be run as it is; open it in the project, which says why")
+        raise Refused(409, "this rig cannot be run; open it in the project to see why")
     return rig
 
 
 async def frames(job: Job, item: Item) -> AsyncIterator[dict[str, Any]]:
-    """What the rig measured since the frame before, until the run has ended."""
+    """Stream the new measurements of the rig until the run ends."""
     from stickslip.stream import rows_since
 
     path, after = item.folder / "live.stream", 0
@@ -282,7 +280,7 @@ async def frames(job: Job, item: Item) -> AsyncIterator[dict[str, Any]]:
 
 
 def kept(site: Site, project: Project, item: Item, job: Job) -> None:
-    """The run's record becomes a log: what the procedure hands on, or of a run that was stopped what there is."""
+    """Turn the run's record into a log: the procedure's record, or the part before a stop."""
     name = next((f for f in ("upload.npz", "live.stream") if (item.folder / f).is_file()), "")
     if not name:
         item.update(

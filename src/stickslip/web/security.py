@@ -1,8 +1,7 @@
-"""Who may ask: this machine's own page, opened with the token that `stickslip web` printed, and nobody else.
+"""Access control: only this machine's own page, opened with the token that `stickslip web` printed.
 
-The token comes in the URL's fragment, which a browser sends to nobody; the page posts it once and gets a cookie of this
-site alone for it. Host and Origin are held against the addresses that the server listens on, so that a page elsewhere,
-also one whose name was made to point here (DNS rebinding), gets nothing.
+The token is in the URL's fragment, which a browser never sends; the page posts it once and gets a same-site cookie for
+it. Host and Origin are compared with the server's addresses, so other pages get no access, even with DNS rebinding.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 SESSION = "/api/session"
-"""Where the token is turned into a cookie: the one address under /api that needs none."""
+"""Address that exchanges the token for a cookie; the only one under /api that needs none."""
 CHANGING = ("POST", "PUT", "PATCH", "DELETE")
 HEADERS = {
     "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; "
@@ -29,30 +28,30 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""Of every answer that does not say otherwise."""
+"""Default headers of answers."""
 
 
 def new_token() -> str:
-    """A token that nobody guesses."""
+    """Return a random token."""
     return secrets.token_urlsafe(32)
 
 
 def same(given: str, token: str) -> bool:
-    """Whether they are equal, told in a time that does not say how far."""
+    """Whether two texts are equal, compared in constant time."""
     return hmac.compare_digest(given.encode("utf-8", "replace"), token.encode())
 
 
 class Gate:
-    """Lets through what comes from the server's own page.
+    """Passes only requests from the server's own page.
 
     Parameters
     ----------
     app : ASGI application
     token : str
     hosts : iterable of str
-        What the header Host may say, such as ``127.0.0.1:8765``; `Origin` may say ``http://`` and one of these.
+        Allowed Host headers, such as ``127.0.0.1:8765``; allowed Origins are ``http://`` and one of these.
     cookie : str
-        Name of the cookie. Cookies do not tell ports apart, so two servers need two names.
+        Name of the cookie. Cookies are shared between ports, so two servers need two names.
     """
 
     def __init__(self, app: ASGIApp, token: str, hosts: Iterable[str], cookie: str) -> None:
@@ -60,7 +59,7 @@ class Gate:
         self.hosts = frozenset(h.lower() for h in hosts)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer or refuse."""
+        """Pass or refuse a request."""
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
             return
@@ -82,21 +81,25 @@ class Gate:
         headers = Headers(scope=scope)
         hosts = headers.getlist("host")
         if len(hosts) != 1 or hosts[0].lower() not in self.hosts:
-            return JSONResponse({"error": "this server answers to its own address alone"}, 403)
+            return JSONResponse({"error": "this server answers only at its own address"}, 403)
         origin = headers.get("origin")
         if origin is not None and origin.lower() not in {f"http://{h}" for h in self.hosts}:
-            return JSONResponse({"error": "another page asks; only this server's own may"}, 403)
+            return JSONResponse(
+                {"error": "this request comes from another page; only this server's own is allowed"}, 403
+            )
         path = scope["path"]
         asking = headers.get("sec-fetch-site", "none")
         if path.startswith("/api/") and asking not in ("same-origin", "none"):
-            return JSONResponse({"error": "another page asks; only this server's own may"}, 403)
+            return JSONResponse(
+                {"error": "this request comes from another page; only this server's own is allowed"}, 403
+            )
         if path.startswith("/api/") and path != SESSION and not self._known(headers):
             return JSONResponse({"error": "no token; open the address that `stickslip web` printed"}, 401)
         if (
             scope["method"] in CHANGING
             and headers.get("content-type", "").partition(";")[0].strip() in FORM_TYPES
         ):
-            return JSONResponse({"error": "forms are not taken; send JSON or a file as it is"}, 415)
+            return JSONResponse({"error": "forms are not accepted; send JSON or a file"}, 415)
         return None
 
     def _known(self, headers: Headers) -> bool:
@@ -110,4 +113,4 @@ class Gate:
 
 
 FORM_TYPES = ("application/x-www-form-urlencoded", "multipart/form-data", "text/plain")
-"""What a page elsewhere can send without being asked; ours sends none of them."""
+"""Content types that other pages can send without a preflight request; this page uses none of them."""

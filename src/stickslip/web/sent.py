@@ -1,8 +1,8 @@
-"""Addresses of models, studies and rigs from elsewhere: kept, looked at, run once their code has been seen and allowed.
+"""Routes of uploaded models, studies and rigs: store, inspect, and run once their code has been shown and approved.
 
-A TOML file may name Python code, and whoever runs it gives it all that he can do himself. So it runs if this user has
-approved the same bytes (`stickslip.approval`), in the page after its text was shown. Nothing that a project says of
-itself counts: what is approved is the text that was shown, known by its SHA-256, whatever the project calls it.
+A TOML file may name Python code, which runs with all rights of the user. So it runs only if this user has approved the
+same bytes (`stickslip.approval`), in the page after its text was shown. Statements of a project about itself are
+ignored: the approval is for the text that was shown, identified by its SHA-256.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from stickslip.web.site import Site
 from stickslip.whole_files import write_whole
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_. -]{0,79}\.(toml|py|csv)", re.IGNORECASE)
-"""Names that are taken as they are, since the TOML file says them; none of them leaves a folder."""
+"""Names that are kept because the TOML file refers to them; none leads out of the folder."""
 MAIN = {"models": "model.toml", "studies": "study.toml", "rigs": "rig.toml"}
 KEPT_AS = {"model": "models", "study": "studies", "simulation": "studies", "rig": "rigs"}
-"""What each kind of file becomes in a project."""
+"""Name of each kind of file in a project."""
 DEVICE = re.compile(r"/dev/[A-Za-z0-9_-]+(/[A-Za-z0-9_.-]+)*")
-"""A serial port and the like, that a rig is reached by."""
+"""A serial port or similar device of a rig."""
 RIG_FILES = ("kind", "machine", "file")
-"""Keys of a rig's table that may name a file, which is read as soon as it is looked at."""
+"""Keys of a rig's table that may name a file, which is read during inspection."""
 LOOK, RUN = "look", "run_sent"
 
 
 def table(site: Site) -> Table:
-    """Handlers by method and path."""
+    """Return handlers by method and path."""
 
     def begin(project: Project, item: Item, task: str, title: str) -> Response:
         job = started(site, project, item, task, title)
@@ -53,14 +53,14 @@ def table(site: Site) -> Table:
             MAIN[kind] if name == main and not machine else name: content for name, content in files.items()
         }
         if len(stored) < len(files):
-            raise Refused(400, f"two of these files would be called {MAIN[kind]}; give one another name")
+            raise Refused(400, f"two of these files would be called {MAIN[kind]}; rename one")
         if machine:
             stored = with_rig(main, stored)
         name = words(main.removesuffix(".toml"), "study")
         item = project.add(kind, name=name, sent=sorted(files), state="looking")
         for name, content in stored.items():
             write_whole(item.folder / name, content, "projects")
-        return begin(project, item, LOOK, f"Looking at {main}")
+        return begin(project, item, LOOK, f"Reading {main}")
 
     async def approve(request: Request) -> Response:
         project, item = site.project(request), site.item(request, request.path_params["kind"])
@@ -68,7 +68,7 @@ def table(site: Site) -> Table:
         shown: dict[str, Any] = about.get("asks", {})
         digest = text(await body(request), "sha256")
         if about.get("state") != "asks" or digest != shown["sha256"]:
-            raise Refused(409, "this is not the code that was shown; open the page again and read it")
+            raise Refused(409, "the code has changed since it was shown; open the page again and review it")
         approval.approve(str(item.folder / shown["name"]), digest)
         item.update(asks=None)
         return begin(project, item, LOOK, f"Running {shown['name']}")
@@ -76,9 +76,9 @@ def table(site: Site) -> Table:
     async def run(request: Request) -> Response:
         project, item = site.project(request), site.item(request, "studies")
         if item.about.get("state") == "asks":
-            raise Refused(409, "it names code that nobody has allowed; read it first")
+            raise Refused(409, "it names code that is not approved; review it first")
         if any(job.item == item.id and not job.ended for job in site.jobs.of(project.id)):
-            raise Refused(409, "it runs already")
+            raise Refused(409, "it is already running")
         return begin(project, item, RUN, f"Running {item.about['name']}")
 
     return {
@@ -89,7 +89,7 @@ def table(site: Site) -> Table:
 
 
 def started(site: Site, project: Project, item: Item, task: str, title: str, short: bool = False) -> Job:
-    """Start a job on an item that was sent; the item keeps what came of it."""
+    """Start a job on an uploaded item; its result is stored in the item."""
     item.update(state="looking" if task == LOOK else "running", problem="")
     request = {"task": task, "folder": str(item.folder), "file": MAIN[item.folder.parent.name]}
 
@@ -102,15 +102,15 @@ def started(site: Site, project: Project, item: Item, task: str, title: str, sho
 
 
 def ask_again(site: Site, project: Project, items: Sequence[Item | None], job: Job) -> None:
-    """Look at the items from which a job was refused code, so that the page shows the code and asks."""
+    """Inspect the items whose code was refused, so the page shows the code and asks for approval."""
     if job.result.get("kind") == CodeRefused.__name__:
         for item in items:
             if item is not None and (item.folder / MAIN[item.folder.parent.name]).is_file():
-                started(site, project, item, LOOK, f"Looking at {item.about['name']}")
+                started(site, project, item, LOOK, f"Reading {item.about['name']}")
 
 
 def told(item: Item, job: Job) -> None:
-    """Keep what a job found out about an item."""
+    """Store what a job found out about an item."""
     if not item.folder.is_dir():
         return
     if job.state == "done":
@@ -120,7 +120,7 @@ def told(item: Item, job: Job) -> None:
 
 
 def files_of(data: dict[str, Any]) -> dict[str, str]:
-    """The texts that were sent, by name.
+    """Return the uploaded texts, by name.
 
     Raises
     ------
@@ -136,14 +136,14 @@ def files_of(data: dict[str, Any]) -> dict[str, str]:
         file = cast("dict[str, Any]", one)
         name = text(file, "name")
         if not NAME.fullmatch(name):
-            only = ".toml, .py and .csv of plain names alone"
+            only = ".toml, .py and .csv files with plain names only"
             raise Refused(400, f"{name[:80]!r}: a model, study or rig comes with {only}")
         out[name] = text(file, "text")
     return out
 
 
 def main_of(files: Mapping[str, str]) -> tuple[str, str]:
-    """The file that names the others, and the kind of item that it makes.
+    """Return the main file, and the kind of item.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def main_of(files: Mapping[str, str]) -> tuple[str, str]:
         try:
             tables[name] = toml_in(files[name])
         except (ValueError, RecursionError) as error:
-            raise Refused(400, f"{name} is no TOML ({' '.join(str(error).split())[:200]})") from None
+            raise Refused(400, f"{name} is not TOML ({' '.join(str(error).split())[:200]})") from None
     named = {PurePosixPath(value).name for one in tables.values() for value in texts_in(one)}
     first = [name for name in tables if name not in named]
     if len(first) != 1:
@@ -165,14 +165,14 @@ def main_of(files: Mapping[str, str]) -> tuple[str, str]:
         for value in texts_in(one):
             if leaves(value) and value not in devices:
                 raise Refused(
-                    400, f"{name} names {value[:80]!r}, outside what was sent; put that file beside it"
+                    400, f"{name} names {value[:80]!r}, which was not uploaded; put that file next to it"
                 )
-    # A machine makes a virtual rig.
+    # A machine becomes a virtual rig.
     machine = kind == "machine"
     if kind not in KEPT_AS and not machine:
-        what = WORDS[kind][0] if kind else "of a kind that is not known"
+        what = WORDS[kind][0] if kind else "of an unknown kind"
         raise Refused(
-            400, f"{main} is {what}; the page takes models, studies, simulations, rigs and machines"
+            400, f"{main} is {what}; the page accepts models, studies, simulations, rigs and machines"
         )
     if kind == "rig" or machine:
         complete(tables, files)
@@ -180,7 +180,7 @@ def main_of(files: Mapping[str, str]) -> tuple[str, str]:
 
 
 def with_rig(machine: str, files: dict[str, str]) -> dict[str, str]:
-    """The files of a machine that was sent alone, with the virtual rig that it makes.
+    """Return the files of a machine uploaded alone, with a virtual rig for it.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def with_rig(machine: str, files: dict[str, str]) -> dict[str, str]:
 
 
 def devices_in(table: Mapping[str, Any]) -> Iterator[str]:
-    """Ports that a rig is reached by; a file of that name is read nowhere."""
+    """Return the device names of a rig, which are never read as files."""
     rig = table.get("rig")
     if isinstance(rig, dict):
         said = cast("dict[str, Any]", rig)
@@ -202,7 +202,7 @@ def devices_in(table: Mapping[str, Any]) -> Iterator[str]:
 
 
 def complete(tables: Mapping[str, Mapping[str, Any]], files: Mapping[str, str]) -> None:
-    """Refuse a rig that names what did not come with it.
+    """Refuse a rig that names files that were not uploaded.
 
     Raises
     ------
@@ -212,13 +212,13 @@ def complete(tables: Mapping[str, Mapping[str, Any]], files: Mapping[str, str]) 
         for key, value in files_in(one):
             if value not in files and (key == "file" or value.lower().endswith((".toml", ".py"))):
                 raise Refused(
-                    400, f"{name} names {value[:80]!r}, which did not come with it; drop both together, and name "
+                    400, f"{name} names {value[:80]!r}, which was not uploaded; drop both together, and name "
                     "it without a folder"
                 )  # fmt: skip
 
 
 def files_in(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Keys of a rig or machine that may name a file, and what they say."""
+    """Return the keys of a rig or machine that may name a file, with their values."""
     for key, value in table.items():
         if isinstance(value, dict):
             yield from files_in(cast("dict[str, Any]", value))
@@ -227,7 +227,7 @@ def files_in(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def texts_in(value: Any) -> Iterator[str]:
-    """Every text in a table."""
+    """Yield every text in a table."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, dict):
@@ -238,6 +238,6 @@ def texts_in(value: Any) -> Iterator[str]:
 
 
 def leaves(value: str) -> bool:
-    """Whether a text, taken for a path, leads out of its folder."""
+    """Whether a text, as a path, leads out of its folder."""
     ways = PurePosixPath(value), PureWindowsPath(value)
     return value.startswith("~") or any(way.anchor or ".." in way.parts for way in ways)

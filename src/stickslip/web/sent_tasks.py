@@ -1,4 +1,4 @@
-"""Tasks of a worker on models, studies and rigs that were sent; their code runs if this user has approved it."""
+"""Tasks of a worker on uploaded models, studies and rigs; their code runs only if this user has approved it."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from stickslip.web.worker import Said, plain
 
 Request = Mapping[str, Any]
 METRICS = ("position_rms_rad", "position_peak_rad", "velocity_rms_rad_s", "torque_rms_Nm", "standstills")
-"""Of a study, in the page's table; all of them are in its metrics.csv."""
+"""Most runs of a study in the page's table; all are in its metrics.csv."""
 
 
 def look(request: Request, say: Said) -> dict[str, Any]:
-    """Load a model, study or rig, or say which code it asks to run."""
+    """Load a model, study or rig, or return the code that needs approval."""
     item = Item(Path(request["folder"]))
     path = item.folder / str(request["file"])
     say({"tell": "reading"})
@@ -37,11 +37,13 @@ def look(request: Request, say: Said) -> dict[str, Any]:
 
 
 def model_of(item: Item, path: Path) -> dict[str, Any]:
-    """What the page shows of a model that a file holds."""
+    """Return the description of a model in a file for the page."""
     from stickslip.identify.identified_file import read_identified
 
     found = read_identified(path)
-    if (item.folder / "result.json").is_file():  # it was identified in the project that this one is a copy of
+    if (
+        item.folder / "result.json"
+    ).is_file():  # it was identified in the project of which this one is a copy
         return {"state": "done"}
     law = found.model.law
     units = {f.name: found.unit(f.par.unit) for f in law.fields}
@@ -62,7 +64,7 @@ def model_of(item: Item, path: Path) -> dict[str, Any]:
 
 
 def study_of(path: Path) -> dict[str, Any]:
-    """What a study or a simulation would run."""
+    """Return a description of what a study or simulation runs."""
     from stickslip.study.study import load, load_run
     from stickslip.verbs.kinds import kind_of
 
@@ -75,7 +77,7 @@ def study_of(path: Path) -> dict[str, Any]:
 
 
 def run_sent(request: Request, say: Said) -> dict[str, Any]:
-    """Run a study or a simulation; writes result.json, and of a study its folder with a report."""
+    """Run a study or a simulation; write result.json, and for a study its folder with a report."""
     from stickslip.verbs.kinds import kind_of
 
     item = Item(Path(request["folder"]))
@@ -86,21 +88,21 @@ def run_sent(request: Request, say: Said) -> dict[str, Any]:
 
 
 def simulation(path: Path) -> dict[str, Any]:
-    """Channels and metrics of one closed loop."""
+    """Return channels and metrics of one closed loop."""
     from stickslip.web.bench_worker import simulated
 
     return {"simulation": simulated(path)}
 
 
 def study(path: Path, item: Item, say: Said) -> dict[str, Any]:
-    """The table of a study; its report lies beside it."""
+    """Return the table of a study; its report is in the same folder."""
     from stickslip.report import write
     from stickslip.study import study as studies
 
     def progress(done: int, of: int) -> None:
         say({"tell": f"{done} of {of} runs", "part": done / max(of, 1)})
 
-    # Finished runs are kept in the folder: what was cancelled goes on from there.
+    # Finished runs are kept in the folder: a cancelled study resumes from there.
     found = studies.run(studies.load(path), item.folder / "out", progress=progress)
     say({"tell": "drawing figures"})
     report = write(found)

@@ -1,4 +1,4 @@
-"""The server: sockets on this machine's own addresses, the line that says where the page is, an orderly end."""
+"""The server: sockets on this machine's own addresses, a line with the page's address, an orderly end."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ def serve(
     projects : Path
         Folder of the projects; it is made.
     port : int
-        0: one that is free.
+        0: any free one.
     host : str
-        Another address than this machine's own two; whoever reaches it and has the token can do everything.
+        An additional address; whoever reaches it and has the token has full access.
     browser : bool
-        Whether a browser is asked to show the page.
+        Whether to open the page in a browser.
     max_upload : int
-        Bytes of a file that is taken.
+        Largest accepted file, bytes.
     jobs : int
-        How many identifications, recommendations, ... run at a time.
+        Number of parallel identifications, recommendations, ...
     tell : callable
-        Is told where the page is.
+        Called with the address of the page.
 
     Raises
     ------
@@ -75,12 +75,12 @@ def serve(
 
 
 def bracketed(host: str) -> str:
-    """An address as URLs write it."""
+    """Return an address in the form of URLs."""
     return f"[{host}]" if ":" in host else host
 
 
 def listening(addresses: tuple[str, ...], port: int) -> list[socket.socket]:
-    """Sockets that listen on the same port of every address; an address of a kind that this machine lacks is left out.
+    """Return sockets that listen on the same port of every address, without addresses that this machine lacks.
 
     Raises
     ------

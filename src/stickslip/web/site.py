@@ -1,4 +1,4 @@
-"""What the handlers share: the projects, the jobs, the limits."""
+"""Shared objects of the handlers: projects, jobs, limits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from stickslip.web.jobs import Jobs
 from stickslip.web.projects import KINDS, Item, Project, Projects, refuse_links
 
 BUSY = ("coming", "reading", "looking", "running")
-"""States of an item that a job, or an upload, of this server ends."""
+"""States of an item that end with a job or an upload of this server."""
 STOPPED = "the server ended before this was finished; "
 REMEDY = {
     "logs": "read it again under “Columns and units”, or delete it", "studies": "run it again",
@@ -35,7 +35,7 @@ class Site:
         Bytes.
     bench : Bench
     coming : set of str
-        Identifiers of the logs that are being uploaded.
+        Identifiers of the logs in upload.
     """
 
     projects: Projects
@@ -45,7 +45,7 @@ class Site:
     coming: set[str] = field(default_factory=set[str])
 
     def project(self, request: Request) -> Project:
-        """The project that the path names.
+        """Return the project in the path.
 
         Raises
         ------
@@ -54,7 +54,7 @@ class Site:
         return self.projects.find(request.path_params["project"])
 
     def item(self, request: Request, kind: str) -> Item:
-        """The log, model or setting that the path names.
+        """Return the log, model or setting in the path.
 
         Raises
         ------
@@ -63,9 +63,9 @@ class Site:
         return self.project(request).item(kind, request.path_params["item"])
 
     def about(self, project: Project, item: Item) -> dict[str, Any]:
-        """Return what the page shows of an item: what is known of it, and whether it is what it claims to be.
+        """Return the facts about an item for the page, with its true state.
 
-        A project may have been moved here, or its server killed, while a job ran: without the job it has failed.
+        A project may have been moved, or its server killed, during a job: without the job the item has failed.
         """
         about, kind = item.about, item.folder.parent.name
         problem = ""
@@ -83,11 +83,11 @@ class Site:
         return {**about, **failed, "problem": problem}
 
     def summary(self, project: Project) -> dict[str, Any]:
-        """Return the name of a project and what it holds, as the page lists it."""
+        """Return the name of a project and its items for the page."""
         held = {kind: [self.about(project, item) for item in project.items(kind)] for kind in KINDS}
         return {"id": project.id, "name": project.name, "folder": str(project.folder), **held}
 
     async def close(self) -> None:
-        """End what runs."""
+        """End all jobs."""
         await self.bench.close()
         await self.jobs.close()

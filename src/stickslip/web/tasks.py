@@ -1,7 +1,7 @@
-"""What a worker does: the verbs of the package, on the files of a project. `TASKS` names them.
+"""Tasks of a worker: the commands of the package on files of a project. `TASKS` lists them.
 
-Every task takes the request, and a function that tells the page how far it is; it writes its results into the item's
-folder and returns what the page shows at once.
+Every task gets the request and a function that reports progress to the page. It writes its results into the item's
+folder and returns the data that the page shows immediately.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from stickslip.whole_files import draft_of
 
 Request = Mapping[str, Any]
 LONG = 300_000
-"""Rows of a log that is shown before the doctor has looked at it, which takes ten seconds and more for a million"""
+"""Rows above which a log is shown before the doctor has finished, which takes ten seconds or more for a million rows"""
 
 
 def read(request: Request, say: Said) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def read(request: Request, say: Said) -> dict[str, Any]:
 
 
 def unread(columns_of: Callable[[Path], tuple[tuple[str, str], ...]], path: Path) -> dict[str, Any]:
-    """The columns of a file that could not be read as a record, so that the page can ask what they are."""
+    """Return the columns of a file that could not be read as a record, for the mapping form."""
     try:
         return {"columns": [list(c) for c in columns_of(path)]}
     except InputError:
@@ -71,12 +71,12 @@ def unread(columns_of: Callable[[Path], tuple[tuple[str, str], ...]], path: Path
 
 
 def called(error: object, path: Path, name: str) -> str:
-    """A message that calls a file by the name that its owner gave it."""
+    """Return a message with the original name of a file."""
     return " ".join(str(error).replace(str(path), name).replace(path.name, name).split())
 
 
 def planes(record: Any) -> list[dict[str, Any]]:
-    """Torque against velocity and against position."""
+    """Return torque against velocity and against position."""
     from stickslip.readers.derive import with_velocity
     from stickslip.web.views import plane
 
@@ -96,7 +96,7 @@ def planes(record: Any) -> list[dict[str, Any]]:
 
 
 def identify(request: Request, say: Said) -> dict[str, Any]:
-    """Identify from the records of some logs; writes model.toml, report.html and result.json."""
+    """Identify from the records of some logs; write model.toml, report.html and result.json."""
     from stickslip.record import Record
     from stickslip.verbs.identify import identify as run
 
@@ -134,20 +134,20 @@ def identify(request: Request, say: Said) -> dict[str, Any]:
 
 
 def named(name: str, names: Mapping[str, str]) -> str:
-    """The name of a source, with the name of its log in the place of its number."""
+    """Return the name of a source, with the name of its log in place of its number."""
     number = next((n for n in sorted(names, key=len, reverse=True) if name.startswith(n)), "")
     return names[number] + name.removeprefix(number) if number else name
 
 
 def picture_data(picture: Any) -> dict[str, Any]:
-    """A picture as plain numbers."""
+    """Return a picture as plain numbers."""
     traces = [{"label": t.label, "kind": t.kind, "x": t.x, "y": t.y, "y2": t.y2} for t in picture.traces]
     said = {k: getattr(picture, k) for k in ("name", "title", "message", "x_label", "y_label", "x_scale")}
     return {**said, "traces": traces}
 
 
 def recommend(request: Request, say: Said) -> dict[str, Any]:
-    """Recommend a setting for a model; writes recommended.toml and result.json."""
+    """Recommend a setting for a model; write recommended.toml and result.json."""
     from stickslip.verbs.recommend import recommend as run
 
     item = Item(Path(request["folder"]))
@@ -213,7 +213,7 @@ def export(request: Request, say: Said) -> dict[str, Any]:
 
 
 def readme(made: Any) -> str:
-    """What an export without a README of its own is."""
+    """Return the README of an export without its own."""
     lines = [made.target.title, "", *(f"- {name}" for name in made.files), ""]
     return "\n".join([*lines, *(f"{note}." for note in made.notes), "Written by stickslip.", ""])
 

@@ -1,4 +1,4 @@
-"""Files that come from the page: written as they come, up to a limit, under names of our own."""
+"""Receive files from the page: write them in parts, up to a limit, under generated names."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from stickslip.web.asking import Refused
 
 KNOWN = RECORDS | {".json", ".jsonl", ".ndjson", ".toml"}
 SPARE = 256 * 2**20
-"""Of the disk, that an upload leaves."""
+"""Share of the disk that stays free."""
 
 
 def suffix_of(name: str) -> str:
-    """The ending that tells a reader the format: one of those known, whatever else stands in the name."""
+    """Return the suffix for the format: a known one, whatever else is in the name."""
     ending = "." + name.rpartition(".")[2].lower() if "." in name else ""
     return ending if ending in KNOWN else ".dat"
 
 
 async def received(request: Request, path: Path, most: int) -> tuple[int, str]:
-    """Write the request's body to a file. Returns its size and SHA-256.
+    """Write the request's body to a file; return its size and SHA-256.
 
     Raises
     ------
@@ -40,7 +40,7 @@ async def received(request: Request, path: Path, most: int) -> tuple[int, str]:
     if not said.isdecimal() or len(said) > 15 or int(said) > most:
         raise too_large
     if shutil.disk_usage(path.parent).free < int(said) + SPARE:
-        raise Refused(507, "there is no room for this file on the disk")
+        raise Refused(507, "there is no space for this file on the disk")
     try:
         with path.open("xb") as file:
             async for chunk in request.stream():
@@ -54,11 +54,11 @@ async def received(request: Request, path: Path, most: int) -> tuple[int, str]:
     except BaseException as error:
         path.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise Refused(507, f"the file cannot be kept ({error.strerror})") from None
+            raise Refused(507, f"the file cannot be stored ({error.strerror})") from None
         raise
     return size, digest.hexdigest()
 
 
 def time_for(size: int) -> float:
-    """s that reading a file may take."""
+    """Return the time limit for reading a file, s."""
     return 240.0 + 240.0 * size / 100e6

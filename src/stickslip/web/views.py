@@ -1,7 +1,7 @@
-"""What the page shows of a record, laid out once by the worker so that the server only slices files.
+"""Store a record for the page once, in the worker, so the server only reads parts of files.
 
-Every channel is a file of numbers, and beside it the least and the greatest of every 64, 512, 4096, ... of them: any
-stretch is then drawn from a few thousand numbers, and no spike is lost, as an average would lose it.
+Every channel is a file of numbers, with the minimum and maximum of every 64, 512, 4096, ... samples. Any interval is
+then drawn from a few thousand numbers without losing a spike, as an average would.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from stickslip.record import Record
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 FIRST, FACTOR = 64, 8
-"""Samples of a block of the lowest level; blocks of a block of the next."""
+"""Samples per block of the lowest level; blocks per block of the next."""
 MOST_BINS = 4000
 CELLS = (240, 180)
-"""Of the plane of two channels."""
+"""Cells of the plane of two channels, per side."""
 
 
 def lay_out(record: Record, folder: Path) -> dict[str, Any]:
-    """Write the view of a record. Returns what the page needs to ask for parts of it."""
+    """Write the view of a record; return the data for requesting parts of it."""
     folder.mkdir(exist_ok=True)
     time = np.ascontiguousarray(record.time, dtype=np.float64)
     ascending = bool(time.size > 1 and np.all(np.isfinite(time)) and np.all(np.diff(time) >= 0.0))
@@ -51,32 +51,32 @@ def lay_out(record: Record, folder: Path) -> dict[str, Any]:
 
 
 def blockwise(least: Any, values: Array, width: int) -> Array:
-    """The least (or greatest) of every `width` values, what is not a number left aside."""
+    """Return the minimum (or maximum) of every `width` values, ignoring NaN."""
     return least.reduceat(values, np.arange(0, values.size, width))
 
 
 def samples(
     folder: Path, about: Mapping[str, Any], channels: Sequence[int], start: float, end: float, bins: int
 ) -> bytes:
-    """A stretch of some channels, thinned to the least and greatest of `bins` blocks.
+    """Return an interval of some channels, thinned to minimum and maximum of `bins` blocks.
 
     Parameters
     ----------
     folder : Path
         Of the view.
     about : mapping
-        What `lay_out` returned.
+        The result of `lay_out`.
     channels : sequence of int
-        Their places.
+        Their indices.
     start, end : float
-        s, or rows where times do not ascend.
+        s, or rows if times are not increasing.
     bins : int
 
     Returns
     -------
     bytes
-        Little-endian 64-bit numbers: points, channels, samples in the stretch, 1 where these are the samples
-        themselves; the times of the points; then of every channel the least and the greatest of each.
+        Little-endian 64-bit numbers: points, channels, samples in the interval, 1 if these are the samples themselves;
+        the times of the points; then minimum and maximum of every channel.
     """
     time = np.load(folder / "time.npy", mmap_mode="r")
     first = max(0, int(np.searchsorted(time, start, "left")) - 1)
@@ -102,7 +102,7 @@ def samples(
 def extremes(
     folder: Path, place: int, level: int, block: int, begin: int, last: int, width: int
 ) -> list[Array]:
-    """Least and greatest of every `width` samples from `begin` to `last`."""
+    """Return minimum and maximum of every `width` samples from `begin` to `last`."""
     if level == 0:
         values = np.asarray(np.load(folder / f"{place}.npy", mmap_mode="r")[begin:last])
         if width == 1:
@@ -116,9 +116,9 @@ def extremes(
 
 
 def plane(x: Array, y: Array) -> dict[str, Any]:
-    """One channel against another: the cells of a grid in which there is a sample, each at a sample that it has.
+    """Return one channel against another: one sample from every non-empty cell of a grid.
 
-    No cell with a sample is left out, so a single outlier is seen among ten million.
+    No non-empty cell is left out, so a single outlier among ten million samples is visible.
     """
     good = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     if not good.size:

@@ -1,7 +1,7 @@
-"""A process that does one job for the page: it reads what to do from stdin and writes lines of JSON to stdout.
+"""A process that does one job for the page: it reads the request from stdin and writes lines of JSON to stdout.
 
-It ends when stdin closes, so that no job outlives the server. ``{"tell": ...}`` says how far it is, ``{"done": ...}``
-what came of it, ``{"error": ...}`` why nothing did: one of the last two is the last line.
+It ends when stdin closes, so no job outlives the server. ``{"tell": ...}`` reports progress, ``{"done": ...}`` the
+result, ``{"error": ...}`` the error: one of the last two is the last line.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from stickslip.errors import StickslipError
 from stickslip.messages import Surface, shown_on
 
 Said = Callable[[dict[str, Any]], None]
-"""Sends one line to the server."""
+"""Sends a line to the server."""
 
 
 def plain(value: Any) -> Any:
-    """Data as JSON holds it: no arrays, and null where a number is not finite."""
+    """Return data for JSON: no arrays, and null for numbers that are not finite."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}  # type: ignore[reportUnknownVariableType, reportUnknownArgumentType]
     if hasattr(value, "tolist"):
@@ -40,7 +40,7 @@ def plain(value: Any) -> Any:
 
 
 def main() -> int:
-    """Do the job that the first line of stdin names."""
+    """Do the job named in the first line of stdin."""
     channel = os.fdopen(os.dup(1), "w", encoding="utf-8", errors="replace")
     os.dup2(2, 1)  # what a library prints is no part of the answer
     get_ready()
@@ -61,7 +61,7 @@ def main() -> int:
 
 
 def get_ready() -> None:
-    """Load what most jobs need while there is none yet: the server keeps a process waiting that has done so."""
+    """Import the modules of most jobs in advance, because the server keeps a prepared process waiting."""
     for name in ("identify", "doctor", "reading", "recommend", "export", "compare"):
         importlib.import_module(f"stickslip.verbs.{name}")
     importlib.import_module("stickslip.web.tasks")
@@ -69,7 +69,7 @@ def get_ready() -> None:
 
 @shown_on(Surface.PAGE)
 def outcome(request: dict[str, Any], say: Said) -> dict[str, Any]:
-    """The last line."""
+    """Return the last line."""
     try:
         tasks = importlib.import_module("stickslip.web.tasks")
         with confined_to(Path(request["project"])):
@@ -78,7 +78,7 @@ def outcome(request: dict[str, Any], say: Said) -> dict[str, Any]:
         return {"error": " ".join(str(error).split()), "kind": type(error).__name__}
     except MemoryError:
         return {
-            "error": "this needs more memory than a file of its size may take; give a part of it, or another format"
+            "error": "this needs more memory than allowed for a file of its size; give a part of it, or another format"
         }
     except Exception as error:  # a reader's library may raise anything on a damaged file
         return {
@@ -88,7 +88,7 @@ def outcome(request: dict[str, Any], say: Said) -> dict[str, Any]:
 
 
 def end_with(stream: TextIO) -> None:
-    """End this process when the server is gone, as an interruption that a rig's loop hears."""
+    """End this process when the server is gone, by an interrupt that a rig's loop handles."""
     for line in stream:
         if line.strip() == "stop":
             break

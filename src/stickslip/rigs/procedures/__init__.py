@@ -1,7 +1,7 @@
-"""What is run on a rig: one file a procedure. `PROCEDURES` names them; `procedure` looks one up.
+"""Procedures for rigs, one per file. `PROCEDURES` lists them; `procedure` looks one up.
 
-To add one, write its file with ``PROCEDURE = YourProcedure`` (`stickslip.rigs.procedures.base` says what it must
-do) and add its name to this tuple.
+To add one, write its file with ``PROCEDURE = YourProcedure`` (`stickslip.rigs.procedures.base` defines the interface)
+and add its name to this tuple.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ PROCEDURES = (
 
 
 def procedure(name: str) -> type[Procedure]:
-    """The procedure of that name.
+    """Return the procedure of that name.
 
     Raises
     ------

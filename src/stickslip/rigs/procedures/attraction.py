@@ -1,7 +1,7 @@
-"""Attraction: a velocity that varies without reversing, within the bend of the sliding curve (thesis 3.1.3.2.4.2).
+"""Attraction: a velocity that varies without reversing, around the bend of the sliding curve (thesis 3.1.3.2.4.2).
 
-Over one turn that starts at the same angle again the motion repeats, so that what depends on the angle can be told from
-what lags behind the velocity.
+The motion repeats over one turn from the same angle, so effects of the angle can be distinguished from lag behind the
+velocity.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Attraction(Procedure):
     bandwidth: float = 10.0
 
     def plan(self, rig: Rig) -> Plan:
-        """The cycles."""
+        """Plan the cycles."""
         seconds = self.cycles / self.frequency
         return Plan(
             seconds + 3.0, self.mean * (seconds + 2.0), self.mean + self.swing, ROOM * rig.limits.torque,
@@ -63,7 +63,7 @@ class Attraction(Procedure):
         yield brake(rig, loop, float(position[-1]), float(velocity[-1]), self.inertia)
 
     def finished(self, record: Record) -> Record:
-        """With a velocity: the slope of the position over 20 ms."""
+        """Add a velocity: the slope of the position over 20 ms."""
         time, position = record.time, record["position"]
         k = max(1, round(0.01 / float(np.median(np.diff(time)))))
         velocity = np.gradient(position, time)
@@ -76,7 +76,7 @@ class Attraction(Procedure):
         )
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """The velocity did not reverse."""
+        """Check that the velocity did not reverse."""
         least = float(np.min(record["velocity"][5:-5]))
         return (
             Check("reversal", least > 0.0, f"the velocity fell to {least:.3g} rad/s; it must stay above 0"),

@@ -1,8 +1,8 @@
-"""What a procedure is, and how one is performed.
+"""Interface and execution of a procedure.
 
-A procedure says beforehand what it will do (`Procedure.plan`), generates its steps one by one from what the rig
-measured so far (`Procedure.steps`), and judges what was recorded (`Procedure.checks`). Its options are the fields of a
-dataclass, in SI units, so that the command line and files set them by name.
+A procedure states its plan in advance (`Procedure.plan`), generates its steps one by one from the measurements so far
+(`Procedure.steps`), and checks the record (`Procedure.checks`). Its options are the fields of a dataclass, in SI units,
+so the command line and files can set them by name.
 """
 
 from __future__ import annotations
@@ -31,35 +31,35 @@ KEPT = (
     "position", "motor_torque", "torque_command", "sensor_torque", "temperature", "position_reference",
     "velocity_reference", "torque_setpoint", "compensation_torque",
 )  # fmt: skip
-"""Channels of a procedure's record. The loop's raw velocity, a difference of two counts, is left to the loop's own."""
+"""Channels of a procedure's record, without the loop's raw velocity, which is a difference of two counts."""
 BYTES = 480
-"""Of memory that a sample takes: its setpoint, its row, copies of both, and what they are computed from"""
+"""Memory of a sample, bytes: its setpoint, its row, copies of both, and their sources"""
 DAY = 86400.0
 LONGEST, LONGEST_REST = 30.0 * DAY, 3650.0 * DAY
-"""s that a plan may run, and rest"""
+"""Longest running time and rest of a plan, s"""
 TIME, POSITION = COLUMNS.index("time"), COLUMNS.index("position")
 
 
 class CheckFailed(RigError):
-    """A run was completed, but is not what it should be; its record is kept."""
+    """A run was completed, but failed a check; its record is kept."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a procedure will do.
+    """The plan of a procedure.
 
     Attributes
     ----------
     duration : float
         Longest time with the loop running, s; ramps that end at a break-away may be shorter.
     pauses : float
-        Time that passes at rest besides, s.
+        Additional time at rest, s.
     held : float
-        Of the duration, what is in memory at once, s; 0: all of it.
+        Part of the duration that is in memory at once, s; 0: all of it.
     travel, speed, torque : float
-        Greatest displacement from where it begins (rad), speed (rad/s) and torque (N·m) that it asks for.
+        Largest displacement from the start (rad), speed (rad/s) and torque (N·m).
     text : tuple of str
-        What happens, a line each.
+        Description, one line for each part.
     """
 
     duration: float
@@ -71,7 +71,7 @@ class Plan:
     held: float = 0.0
 
     def within(self, rig: Rig) -> None:
-        """Refuse a plan beyond the rig's limits, this machine's memory or all patience.
+        """Refuse a plan that exceeds the rig's limits, the available memory or a reasonable duration.
 
         Raises
         ------
@@ -83,19 +83,17 @@ class Plan:
         ):  # fmt: skip
             if value > limit:
                 raise InputError(
-                    f"the plan asks for a {what} of {value:.4g} {unit}; {rig.name} allows {limit:.4g}; ask for less"
+                    f"the plan requires a {what} of {value:.4g} {unit}; {rig.name} allows {limit:.4g}; reduce it"
                 )
         room = limits.position[1] - limits.position[0]
         if self.travel > room:
-            raise InputError(
-                f"the plan travels {self.travel:.4g} rad; {rig.name} has {room:.4g}; ask for less"
-            )
+            raise InputError(f"the plan travels {self.travel:.4g} rad; {rig.name} has {room:.4g}; reduce it")
         for what, seconds, most in (
             ("runs", self.duration, LONGEST), ("rests", self.pauses, LONGEST_REST),
         ):  # fmt: skip
             if not seconds <= most:
                 raise InputError(
-                    f"the plan {what} for {seconds / DAY:.3g} days; {most / DAY:g} are the most; ask for less"
+                    f"the plan {what} for {seconds / DAY:.3g} days; at most {most / DAY:g} are allowed; reduce it"
                 )
         held = self.held or self.duration
         insist_on_memory(
@@ -107,9 +105,9 @@ class Plan:
 class Step:
     """A segment of the loop.
 
-    ``setpoints`` are those of its samples, ``keep`` says whether the record holds it (every ``average`` samples as
+    ``setpoints`` are those of its samples, ``keep`` determines whether it is recorded (every ``average`` samples as
     their mean), ``pause`` is a rest before it (s), ``travel`` ends it early; ``learned`` is what the controller's laws
-    have learned before, and afterwards what they have learned since.
+    have learned before, and afterwards what they have learned in total.
     """
 
     setpoints: Array
@@ -128,7 +126,7 @@ Steps = Generator[Step, Array, None]
 
 @dataclass(frozen=True)
 class Check:
-    """One acceptance check: whether it passed, and a sentence with its number."""
+    """An acceptance check: whether it passed, and a sentence with the measured number."""
 
     name: str
     passed: bool
@@ -142,7 +140,7 @@ class Procedure:
     name: ClassVar[str] = ""
     title: ClassVar[str] = ""
     signed: ClassVar[tuple[str, ...]] = ()
-    """Options that may be below 0, as they have a direction; no other may, whose value is held against limits."""
+    """Options that may be negative, because they have a direction; all others are compared with limits."""
 
     def __post_init__(self) -> None:
         for option in (f.name for f in dataclasses.fields(self) if f.name not in self.signed):
@@ -153,33 +151,33 @@ class Procedure:
                     raise InputError(f"{self.name}: {option} = {number:g} must be 0 or greater")
 
     def plan(self, rig: Rig) -> Plan:
-        """What it will do on this rig."""
+        """Return the plan for this rig."""
         raise NotImplementedError
 
     def steps(self, rig: Rig) -> Steps:
-        """Its steps."""
+        """Generate the steps."""
         raise NotImplementedError
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """Whether the record is what it should be."""
+        """Check the record."""
         raise NotImplementedError
 
     def finished(self, record: Record) -> Record:
-        """The record as identification takes it."""
+        """Return the record for identification."""
         return record
 
     def options(self) -> dict[str, Any]:
-        """Options as plain data."""
+        """Return the options as plain data."""
         return {f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)}
 
     @classmethod
     def with_options(cls, given: Mapping[str, str]) -> Procedure:
-        """This procedure with options as people write them: numbers, words, numbers with commas between.
+        """Return this procedure with options given as text: numbers, words, numbers separated by commas.
 
         Raises
         ------
         InputError
-            For an option that it has not, or a value of another kind.
+            For an unknown option, or a value of another type.
         """
         known = {f.name: f for f in dataclasses.fields(cls)}
         values: dict[str, Any] = {}
@@ -207,19 +205,19 @@ def _parsed(name: str, text: str, like: Any) -> Any:
             raise ValueError
         return number
     except ValueError:
-        kind = "numbers with commas between" if isinstance(like, tuple) else "a number"
+        kind = "numbers separated by commas" if isinstance(like, tuple) else "a number"
         raise InputError(f"{name} = {text!r} must be {kind}") from None
 
 
 @dataclass(frozen=True, eq=False)
 class Performed:
-    """What a procedure recorded, with the verdicts of its checks."""
+    """The record of a procedure, with the results of its checks."""
 
     record: Record
     checks: tuple[Check, ...]
     plan: Plan
     segments: tuple[tuple[str, int, int], ...] = field(default=())
-    """Label, first and last row (exclusive) of every step that was kept."""
+    """Label, first and last row (exclusive) of every recorded step."""
 
     @property
     def passed(self) -> bool:
@@ -227,7 +225,7 @@ class Performed:
         return all(c.passed for c in self.checks)
 
     def insist(self) -> Performed:
-        """This, or the first check that failed as an error.
+        """Return this, or raise the first failed check as an error.
 
         Raises
         ------
@@ -239,7 +237,7 @@ class Performed:
         return self
 
     def part(self, label: str) -> Record:
-        """The rows of one step."""
+        """Return the rows of one step."""
         for name, begin, end in self.segments:
             if name == label:
                 channels = {k: v[begin:end] for k, v in self.record.channels.items()}
@@ -263,12 +261,12 @@ def perform(
     procedure : Procedure
     rig : Rig
     path : path, optional
-        Where every sample is written as it comes (`stickslip.stream`). Without it a virtual rig's samples that are not
-        kept are forgotten after each step, so that long runs need little memory.
+        File to which every sample is written immediately (`stickslip.stream`). Without it a virtual rig's unrecorded
+        samples are discarded after each step, so long runs need little memory.
     progress : callable, optional
-        Called with the label of every step that has one.
+        Called with the label of every labelled step.
     without_watchdog, realtime
-        As `Loop`. In real time the record's ``meta["loop"]`` tells how time was kept.
+        As `Loop`. In real time the record's ``meta["loop"]`` has the timing statistics.
 
     Raises
     ------
@@ -284,12 +282,12 @@ def perform(
 
 
 def planned(procedure: Procedure, rig: Rig) -> Plan:
-    """What a procedure will do on a rig.
+    """Return the plan of a procedure on a rig.
 
     Raises
     ------
     InputError
-        If its options make no plan.
+        If its options give no valid plan.
     """
     with _blamed(procedure):
         return procedure.plan(rig)
@@ -297,7 +295,7 @@ def planned(procedure: Procedure, rig: Rig) -> Plan:
 
 @contextmanager
 def _blamed(procedure: Procedure) -> Generator[None]:
-    """Arithmetic that fails is the options' fault: none of them is bounded by itself."""
+    """Report failed arithmetic as an error of the options, none of which is bounded by itself."""
     try:
         yield
     except (ArithmeticError, ValueError, MemoryError) as error:
@@ -305,7 +303,7 @@ def _blamed(procedure: Procedure) -> Generator[None]:
         given = {k: v for k, v in vars(procedure).items() if v != usual.get(k)}
         words = ", ".join(f"{name} = {value}" for name, value in given.items()) or "its own options"
         raise InputError(
-            f"{procedure.name}: nothing can be done with {words} ({error}); give other numbers"
+            f"{procedure.name}: no plan is possible with {words} ({error}); give other numbers"
         ) from error
 
 
@@ -322,8 +320,8 @@ def _performed(
         meta["loop"] = account.plain()
     if not any(len(rows) for _, rows in kept):
         raise InputError(
-            f"{procedure.name}: not one row was kept: every part is shorter than a row of the record; ask for longer "
-            "ones, or fewer samples a row"
+            f"{procedure.name}: no row was recorded: every part is shorter than a row of the record; request longer "
+            "ones, or fewer samples per row"
         )
     record = _record(rig, [rows for _, rows in kept], meta)
     ends = np.cumsum([len(rows) for _, rows in kept]).tolist()
@@ -339,13 +337,13 @@ def _run(
     procedure: Procedure, rig: Rig, path: Any, meta: Mapping[str, Any], progress: Any, without_watchdog: bool,
     realtime: bool | None,
 ) -> tuple[list[tuple[str, Array]], Account | None]:  # fmt: skip
-    """The rows that are kept, by their step's label, and in real time how time was kept."""
+    """Return the recorded rows, by the label of their step, and in real time the timing statistics."""
     kept: list[tuple[str, Array]] = []
     steps = procedure.steps(rig)
     paced = rig.capabilities.real_clock or bool(realtime)
     account: Account | None = None
     step = next(steps, None)
-    # If nothing is written, the loop is restarted after a pause, and rows that were not kept are dropped.
+    # Without a file the loop is restarted after a pause, and unrecorded rows are dropped.
     single = path is not None or paced
     while step is not None:
         with Loop(rig, path=path, meta=meta, without_watchdog=without_watchdog, realtime=realtime) as loop:
@@ -360,7 +358,7 @@ def _run(
 def _next(steps: Steps, rows: Array) -> Step | None:
     """Return the step after one that recorded these rows; None at the end.
 
-    An exception at the end would leave the loop as failed and hide the error that the rig raises when it is closed.
+    An exception at the end would mark the loop as failed and hide the error that the rig raises when it is closed.
     """
     try:
         return steps.send(rows)
@@ -383,7 +381,7 @@ def _one(loop: Loop, step: Step, kept: list[tuple[str, Array]], meta: Any, progr
 
 
 def averaged(rows: Array, count: int) -> Array:
-    """Means of `count` rows; the last, incomplete ones are dropped."""
+    """Return the means of `count` rows; the last, incomplete ones are dropped."""
     if count <= 1:
         return np.array(rows)
     whole = len(rows) // count

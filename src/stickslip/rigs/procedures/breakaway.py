@@ -1,4 +1,5 @@
-"""Break-away: torque ramps every few degrees around the revolution, both ways (thesis 4.3.1.1.1, 4.3.2.1.1)."""
+"""Break-away: torque ramps every few degrees around the revolution, in both directions (thesis 4.3.1.1.1,
+4.3.2.1.1)."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ class Breakaway(Procedure):
     """Options of the procedure.
 
     ``interval`` between the angles in degrees, ``rate`` of the ramps in N·m/s, ``highest`` torque of a ramp in N·m (0:
-    what the rig allows, nearly), ``travel`` in rad that ends a ramp, ``inertia`` in kg·m² of the loop that moves
+    nearly the rig's limit), ``travel`` in rad that ends a ramp, ``inertia`` in kg·m² of the loop that moves
     between the angles, ``bandwidth`` of that loop in Hz, ``wait`` in s at rest before a ramp.
     """
 
@@ -40,17 +41,17 @@ class Breakaway(Procedure):
 
     @property
     def angles(self) -> int:
-        """How many around the revolution."""
+        """Number of angles per revolution."""
         return max(1, round(360.0 / self.interval))
 
     def plan(self, rig: Rig) -> Plan:
-        """The longest: every ramp goes to its top."""
+        """Plan for the longest run: every ramp reaches its top."""
         ramp = self.top(rig) / self.rate
         each = ramp + 1.5
         return Plan(
             2 * self.angles * each, 2.0 * math.pi + 1.0, 0.33 * rig.limits.speed, ROOM * rig.limits.torque,
             (
-                f"{self.angles} angles, {self.interval:g} degrees apart: go there, rest {self.wait:g} s",
+                f"{self.angles} angles, {self.interval:g} degrees apart: move there, rest {self.wait:g} s",
                 f"ramp the torque with {self.rate:g} N·m/s until it has moved {self.travel:g} rad, at most to "
                 f"{self.top(rig):.3g} N·m; once in each direction",
             ),
@@ -58,7 +59,7 @@ class Breakaway(Procedure):
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:
-        """Around once in each direction, so that each ramp goes on the way the axis came."""
+        """Go around once in each direction, so each ramp continues in the direction of the move before."""
         dt = rig.sample_time
         loop = holder(rig, self.inertia, self.bandwidth)
         rows = yield now(rig)
@@ -71,7 +72,7 @@ class Breakaway(Procedure):
                 place = i if direction > 0.0 else self.angles - i
                 goal = origin + place * step
                 here = float(rows[-1, POSITION])
-                # A ramp begins where the contact is loaded the way it will break.
+                # A ramp starts with the contact loaded in the direction of the break-away.
                 yield move(rig, loop, here, goal - 0.3 * direction * step, self.inertia)
                 yield move(rig, loop, goal - 0.3 * direction * step, goal, self.inertia)
                 rest = setpoints(round(0.2 / dt))
@@ -80,11 +81,11 @@ class Breakaway(Procedure):
                     setpoints(count, torque=direction * ramp), travel=self.travel, keep=True,
                     label=f"{math.degrees(goal - origin):.0f} degrees {'+' if direction > 0 else '-'}",
                 )  # fmt: skip
-                # It springs back when the torque goes, which is no break-away: not kept.
+                # It springs back when the torque is removed, which is not a break-away: not recorded.
                 rows = yield Step(setpoints(round(0.15 / dt)))
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """Every ramp moved the axis."""
+        """Check that every ramp moved the axis."""
         torque = record["torque_setpoint"]
         starts = np.flatnonzero((torque[1:] != 0.0) & (torque[:-1] == 0.0)) + 1
         moved = 0

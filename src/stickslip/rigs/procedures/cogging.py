@@ -1,9 +1,9 @@
-"""Cogging: slow rotations of two revolutions each way, for `stickslip identify --method cogging`.
+"""Cogging: slow rotations of two revolutions in each direction, for `stickslip identify --method cogging`.
 
-Slow, since a rotor's inertia carries the cogging of a fast one, so that the motor's torque does not show it, but not so
-slow that the axis jumps from well to well: an order must pass below the loop's bandwidth, and the loop must hold the
-axis against it. Several speeds, so that what depends on velocity comes apart from the level of friction. Every row of
-1 ms is kept: means over more would smooth high orders away.
+They are slow, because the inertia of a fast rotor carries it through the cogging, which then does not appear in the
+motor torque; but not so slow that the axis jumps from one stable position to the next: an order must pass below the
+loop's bandwidth, and the loop must hold the axis against it. Several speeds separate effects of the velocity from the
+level of friction. Every row of 1 ms is recorded, because averaging would remove high orders.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from stickslip.rigs.procedures.sliding import Sliding
 SLOW = (0.6, 0.4, 0.25)
 """rad/s"""
 BELOW = 5.0
-"""Times the frequency at which the highest order passes: the loop's bandwidth, at least."""
+"""Smallest bandwidth of the loop, in multiples of the frequency at which the highest order passes."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Cogging(Sliding):
     """Options of the procedure: those of `stickslip.rigs.procedures.sliding.Sliding`.
 
     ``velocities`` in rad/s, ``degrees`` of each run, ``inertia`` in kg·m² and ``bandwidth`` in Hz of the loop, ``rest``
-    in s before each velocity. ``order``: the highest that is to be seen, periods a turn of the motor (0: not known),
-    and ``gear``, turns of the motor for one of the axis, at which the position is measured: the velocities are lowered
-    together until that order passes at a fifth of the bandwidth.
+    in s before each velocity. ``order``: the highest order of interest, periods per motor revolution (0: unknown), and
+    ``gear``, motor revolutions per revolution of the axis, where the position is measured: all velocities are lowered
+    until that order passes at a fifth of the bandwidth.
     """
 
     name: ClassVar[str] = "cogging"
@@ -41,7 +41,7 @@ class Cogging(Sliding):
 
     @property
     def speeds(self) -> tuple[float, ...]:
-        """From the greatest, rad/s, so that the highest order is seen."""
+        """Velocities in descending order, rad/s, low enough for the highest order."""
         given = super().speeds
         passing = self.order * self.gear * max(given) / (2.0 * math.pi)
         slower = max(1.0, BELOW * passing / self.bandwidth) if self.bandwidth > 0.0 else 1.0

@@ -1,9 +1,9 @@
-"""Inertia: a random current of two amplitudes over a running speed (thesis 4.2).
+"""Inertia: a random current of two amplitudes superposed on a running speed (thesis 4.2).
 
-The thesis excites the axis from rest, and finds its responses apart at low frequencies, where friction's sign changes.
-Here the axis runs, so that it never does: a damping loop holds the mean speed, and a run that slows to less than the
-least speed is refused. Power grows with the frequency up to the band's end, which moves the speed less than white
-noise does. Where the rig's torque or speed leaves no room for the currents asked for, all are lowered alike.
+The thesis excites the axis from rest, and its responses differ at low frequencies, because friction changes sign. Here
+the axis runs, so the sign stays: a damping loop keeps the mean speed, and a run below the least speed is refused. The
+power grows with the frequency up to the end of the band, which changes the speed less than white noise. If the rig's
+torque or speed does not allow the requested currents, all are reduced by the same factor.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from stickslip.rigs.rig import Rig, setpoints
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TORQUE = COLUMNS.index("motor_torque")
 SLOW = 0.02
-"""s over which a speed is taken to see whether it reverses."""
+"""Window of the speed for detecting a reversal, s."""
 DAMPING = 20.0
-"""Hz, where the damping loop and the inertia's own impedance are equal."""
+"""Frequency at which damping loop and inertia have equal impedance, Hz."""
 BIAS = 0.6
-"""Of the torque limit, which running may take; else it runs slower."""
+"""Share of the torque limit for the running speed; if it needs more, it runs slower."""
 CREST = 2.2
 """Largest value of the noise over its RMS."""
 
@@ -49,8 +49,8 @@ CREST = 2.2
 class Inertia(Procedure):
     """Options of the procedure.
 
-    ``current`` in A RMS, one record part each, ``torque_constant`` in N·m/A, ``band`` in Hz, ``speed`` the mean and
-    ``least`` the least speed in rad/s (speed 0: chosen, at most half of what the rig allows), ``duration`` of each
+    ``current`` in A RMS, one part of the record each, ``torque_constant`` in N·m/A, ``band`` in Hz, ``speed`` the mean
+    and ``least`` the least speed in rad/s (speed 0: automatic, at most half of the rig's limit), ``duration`` of each
     part in s.
     """
 
@@ -67,7 +67,7 @@ class Inertia(Procedure):
     seed: int = 1
 
     def plan(self, rig: Rig) -> Plan:
-        """All parts one after the other."""
+        """Plan all parts one after the other."""
         v = self.speed or 0.5 * rig.limits.speed
         total = len(self.current) * (self.duration + 12.0) + 12.0
         each = ", ".join(f"{c:g}" for c in self.current)
@@ -75,15 +75,15 @@ class Inertia(Procedure):
             total, v * total, 2.0 * v if not self.speed else min(2.0 * v, rig.limits.speed),
             ROOM * rig.limits.torque,
             (
-                "ramp the torque until the axis moves, push it and let it coast: a first idea of the inertia",
-                f"random currents of {each} A RMS, or as much as the limits leave room for, up to {self.band:g} Hz "
+                "ramp the torque until the axis moves, push it and let it coast: a first estimate of the inertia",
+                f"random currents of {each} A RMS, or as much as the limits allow, up to {self.band:g} Hz "
                 f"over at most {v:.3g} rad/s, {self.duration:g} s each",
             ),
             3.0 * len(self.current),
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:
-        """A first idea, then speed up, excite, stop, for each current."""
+        """Estimate roughly, then speed up, excite and stop for each current."""
         inertia, _ = yield from rough_inertia(rig)
         follow = holder(rig, inertia, 8.0)
         speed, bias = yield from self._running(rig, follow, inertia)
@@ -93,7 +93,7 @@ class Inertia(Procedure):
     def _running(
         self, rig: Rig, follow: Controller, inertia: float
     ) -> Generator[Step, Array, tuple[float, float]]:
-        """The speed to run at and the torque that this takes: the fastest that leaves room for the noise."""
+        """Return the running speed and its torque: the fastest that leaves torque for the noise."""
         found: tuple[float, float] | None = None
         speed = self.speed or 2.0 * self.least
         while True:
@@ -143,7 +143,8 @@ class Inertia(Procedure):
         yield Step(setpoints(round(0.2 / dt)))
 
     def _applied(self, room: float, inertia: float, kd: float, v: float) -> float:
-        """The largest RMS torque: as asked for, within 0.6 of the room, and with speeds that stay above the least."""
+        """Return the largest RMS torque: as requested, within 0.6 of the available torque, with speeds above the
+        least."""
         corner = inertia * 2.0 * math.pi * self.band
         # Variance of the speed of an inertia with damping kd under noise whose power grows with the frequency.
         spread = math.log1p((corner / kd) ** 2) / corner**2
@@ -151,7 +152,8 @@ class Inertia(Procedure):
         return min(max(self.current) * self.torque_constant, 0.6 * room / CREST, slowest)
 
     def noise(self, count: int, dt: float, rms: float, place: int) -> Array:
-        """Noise with power in proportion to the frequency up to the band's end, its peaks at most `CREST` times RMS."""
+        """Return noise with power proportional to the frequency up to the end of the band, with peaks of at most
+        `CREST` times RMS."""
         rng = np.random.default_rng((self.seed, place))
         f = np.fft.rfftfreq(count, dt)
         inside = (f <= self.band) & (f >= 0.5 * self.lowest)
@@ -163,7 +165,7 @@ class Inertia(Procedure):
         return rms * np.clip(noise, -CREST, CREST)
 
     def finished(self, record: Record) -> Record:
-        """The measured current belongs to the sample that ended: it is moved to the row in which that began."""
+        """Shift the measured current, which belongs to the sample that ended, to the row of its start."""
         channels = dict(record.channels)
         for name in ("motor_torque", "sensor_torque"):
             if name in channels:
@@ -175,7 +177,7 @@ class Inertia(Procedure):
         )
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """The speed never fell below the least one; and what current that took."""
+        """Check that the speed stayed above the least, and report the current."""
         lowest = float(np.min(slopes(record, SLOW)))
         excited = record["torque_setpoint"]
         parts = np.array_split(excited, len(self.current))
@@ -187,12 +189,12 @@ class Inertia(Procedure):
                 f"the lowest speed over {1e3 * SLOW:g} ms was {lowest:.3g} rad/s, at least {self.least:g} is needed so "
                 "that friction keeps its sign; if it fails, raise speed or lower current",
             ),
-            Check("current", True, f"{applied} A RMS applied of {asked} asked for"),
+            Check("current", True, f"{applied} A RMS applied of {asked} requested"),
         )  # fmt: skip
 
 
 def slopes(record: Record, window: float) -> Array:
-    """Speed over a window, rad/s, inside each stretch without a gap."""
+    """Return the speed over a window, rad/s, in each segment without a gap."""
     time, position = record.time, record["position"]
     dt = float(np.median(np.diff(time)))
     k = max(1, round(window / dt))

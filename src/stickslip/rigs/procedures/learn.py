@@ -1,4 +1,4 @@
-"""Learn: a tracking repeated, each time with a feedforward that the times before have left, over time or the angle."""
+"""Learn: repeat a tracking, each time with the feedforward learned so far, over time or the angle."""
 
 from __future__ import annotations
 
@@ -31,25 +31,24 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 TORQUE = COLUMNS.index("torque_command")
 OVER = ("time", "angle")
 RETURNED = 1e-3
-"""Of the reference's range, by which it may end beside its start."""
+"""Allowed distance between start and end of the reference, as a share of its range."""
 GROWN = 1.5
-"""Times the least error: a repetition that is worse ends the learning."""
+"""Multiple of the smallest error at which the learning ends."""
 
 
 @dataclass(frozen=True)
 class Learn(Track):
-    """Options of `track`, with a reference that returns to its start; ``times`` repetitions, of whose torque the share
-    ``rate`` is taken over each time. ``over`` time: through a low-pass without lag of the ``corner`` (Hz; 0: the
-    bandwidth), given ``advance`` samples earlier. ``over`` angle: the mean of each direction in each of ``bins`` of the
-    reference's range, which holds for every motion in it, as far as torque depends on the angle. ``map`` is the
-    model.toml of an identified map over the angle (``[position_map]``): its even part is fed forward from the first
-    repetition on, and what is learned is what the map leaves. ``save`` is the TOML file to which the controller with
-    the best table (and the map) is written, for `track` with ``controller``; one that is there is replaced only where
-    the same was learned on the same machine. Its ``uncertainty`` is by how much another repetition would have changed
-    the table, N·m RMS.
+    """Options of `track`, with a reference that returns to its start; ``times`` repetitions, each of which adds the
+    share ``rate`` of its torque to the table. ``over`` time: through a zero-phase low-pass with the ``corner`` (Hz; 0:
+    the bandwidth), applied ``advance`` samples earlier. ``over`` angle: the mean of each direction in each of ``bins``
+    of the reference's range, valid for every motion in it as far as torque depends on the angle. ``map`` is the
+    model.toml of an identified map over the angle (``[position_map]``): its even part is a feedforward from the first
+    repetition on, and the residual is learned. ``save`` is the TOML file for the controller with the best table (and
+    the map), for `track` with ``controller``; an existing file is replaced only if the same was learned on the same
+    machine. Its ``uncertainty`` is the expected change of the table by another repetition, N·m RMS.
 
-    No model of the rig is asked for, so that the condition of convergence is not checked beforehand
-    (`stickslip learn` does on a simulation): a repetition whose error is half as large again as the least ends it.
+    No model of the rig is required, so convergence is not checked in advance (`stickslip learn` checks it on a
+    simulation): a repetition with more than 1.5 times the smallest error ends the learning.
     """
 
     name: ClassVar[str] = "learn"
@@ -69,7 +68,7 @@ class Learn(Track):
     save: str = ""
 
     def plan(self, rig: Rig) -> Plan:
-        """Every repetition."""
+        """Plan every repetition."""
         one, angle = Track.plan(self, rig), self.samples(rig)[:, 0]
         if abs(float(angle[-1] - angle[0])) > RETURNED * float(np.ptp(angle)):
             raise InputError(
@@ -88,7 +87,7 @@ class Learn(Track):
             )
         text = (
             *one.text,
-            f"{self.times} times; {100.0 * self.rate:.0f} % of the torque is taken over each time, by the {self.over}",
+            f"{self.times} times; {100.0 * self.rate:.0f} % of the torque is learned each time, over {self.over}",
         )
         return replace(one, duration=self.times * one.duration, text=text, pauses=self.times * self.wait)
 
@@ -104,12 +103,12 @@ class Learn(Track):
             raise InputError(f"learn: bins = {self.bins} must be at least 2")
 
     def mapped(self) -> list[ControlBlock]:
-        """The feedforward of the map, by the reference's angle; none without a map.
+        """Return the feedforward of the map, by the reference angle; none without a map.
 
         Raises
         ------
         InputError
-            If the file holds none, or the compensator's model brings one of its own.
+            If the file has none, or the compensator's model has its own.
         """
         if not self.map:
             return []
@@ -121,20 +120,20 @@ class Learn(Track):
         table = read_toml(Path(self.map))
         if not table.has("position_map"):
             raise InputError(
-                f"learn: map = {self.map} holds no map over the angle; give the model.toml of `stickslip identify "
+                f"learn: map = {self.map} contains no map over the angle; give the model.toml of `stickslip identify "
                 "--method cogging`"
             )
         return [position_feedforward(PositionMap.of(table.table("position_map").values), angle="reference")]
 
     def table(self, rig: Rig, path: Array, largest: float) -> TimeTable | AngleTable:
-        """What is learned, empty."""
+        """Return the empty table."""
         if self.over == "angle":
             return AngleTable.over(path[:, 0], path[:, 1], self.bins, self.rate, largest)
         weights = low_pass(self.corner or self.bandwidth, rig.sample_time)
         return TimeTable(np.zeros(len(path)), rig.sample_time, self.rate, self.advance, weights, largest)
 
     def steps(self, rig: Rig) -> Steps:
-        """`Track.steps`, from the same place each time."""
+        """Generate the steps of `Track`, from the same place each time."""
         rows = yield Step(setpoints(round(0.05 / rig.sample_time)), pause=self.wait)
         motion = self.samples(rig)
         path = np.column_stack([float(rows[-1, POSITION]) + motion[:, 0], motion[:, 1:]])
@@ -147,7 +146,7 @@ class Learn(Track):
                 len(path), position=path[:, 0], velocity=path[:, 1], acceleration=path[:, 2],
                 torque=self.angle().torque(path[:, 0]), closed=1.0,
             )  # fmt: skip
-            # Every repetition starts from rest without torque, as the first does.
+            # Every repetition starts from rest without torque, like the first.
             rest = self.wait if i > 1 else 0.0
             rows = yield Step(sent, controller, keep=True, pause=rest, label=f"repetition {i}")
             error = rms(path[: len(rows), 0] - rows[:, POSITION])
@@ -166,13 +165,13 @@ class Learn(Track):
             write_table(Path(self.save), {**content, **told})
 
     def origin(self, rig: Rig) -> dict[str, str]:
-        """What says whose table it is."""
+        """Return the origin of the table."""
         return {
             "machine": machine_in(rig.name), "procedure": self.name, "reference": self.reference, "domain": self.over,
         }  # fmt: skip
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """Whether the error fell."""
+        """Check that the error decreased."""
         each = errors(record, len(self.samples(rig)))
         listed = ", ".join(f"{1e3 * e:.4g}" for e in each)
         return (
@@ -181,12 +180,12 @@ class Learn(Track):
 
 
 def with_more(controller: Controller, more: list[ControlBlock]) -> Controller:
-    """The controller with more feedforwards."""
+    """Return the controller with additional feedforwards."""
     return replace(controller, feedforward=[*controller.feedforward, *more])
 
 
 def ahead_of(controller: Controller, position: Array, path: Array) -> Array:
-    """The feedforward of every sample, N·m, shape (n,)."""
+    """Return the feedforward of every sample, N·m, shape (n,)."""
     torque, ahead = np.zeros(len(path)), np.zeros(len(path))
     inputs = np.ascontiguousarray(np.column_stack([position, path]))
     replay(compiled(controller), inputs, np.array(Surroundings()), FEEDFORWARD, torque, ahead)
@@ -194,7 +193,7 @@ def ahead_of(controller: Controller, position: Array, path: Array) -> Array:
 
 
 def errors(record: Record, samples: int) -> list[float]:
-    """RMS error of every repetition, rad."""
+    """Return the RMS error of every repetition, rad."""
     error = record["position_reference"] - record["position"]
     return [rms(error[i : i + samples]) for i in range(0, len(error), samples)]
 

@@ -1,4 +1,4 @@
-"""What procedures have in common: moves, the loop that holds a motion, a first idea of the inertia."""
+"""Shared parts of procedures: moves, the positioning loop, a rough estimate of the inertia."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from stickslip.rigs.rig import Rig, setpoints
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 ROOM = 0.95
-"""Of the rig's torque limit, which controllers and ramps use."""
+"""Share of the rig's torque limit for controllers and ramps."""
 PUSH = 0.15
-"""Of the torque limit, which planned accelerations use."""
+"""Share of the torque limit for planned accelerations."""
 
 
 def samples(rig: Rig, seconds: float) -> int:
-    """How many samples so long a time has, at least 2.
+    """Return the number of samples in a time, at least 2.
 
     Raises
     ------
@@ -35,18 +35,18 @@ def samples(rig: Rig, seconds: float) -> int:
 
 
 def now(rig: Rig, seconds: float = 0.05) -> Step:
-    """A step that only looks where the axis is."""
+    """Return a step that only measures the position."""
     return Step(setpoints(samples(rig, seconds)))
 
 
 def holder(rig: Rig, inertia: float, bandwidth: float) -> Controller:
-    """A PID that follows positions (thesis eq. 3.15; damping 0.85 as in Table 6), within the torque limit."""
+    """Return a PID for positions (thesis eq. 3.15; damping 0.85 as in Table 6), within the torque limit."""
     gains = place("PID", inertia, bandwidth, 0.85)
     return Controller(gains, None, ROOM * rig.limits.torque, rig.sample_time)
 
 
 def smooth(begin: float, end: float, count: int, sample_time: float) -> tuple[Array, Array]:
-    """Position and velocity of a move from rest to rest with the least jerk (Flash and Hogan 1985)."""
+    """Return position and velocity of a minimum-jerk move from rest to rest (Flash and Hogan 1985)."""
     s = np.arange(1, count + 1) / count
     shape = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
     slope = 30.0 * s**2 * (1.0 - s) ** 2 / (count * sample_time)
@@ -54,7 +54,7 @@ def smooth(begin: float, end: float, count: int, sample_time: float) -> tuple[Ar
 
 
 def move(rig: Rig, controller: Controller, begin: float, end: float, inertia: float) -> Step:
-    """A closed-loop move as fast as `PUSH` and a third of the speed limit allow, at least 0.3 s."""
+    """Return a closed-loop move, as fast as `PUSH` and a third of the speed limit allow, at least 0.3 s."""
     distance = abs(end - begin)
     by_torque = math.sqrt(5.8 * distance * inertia / (PUSH * rig.limits.torque))
     by_speed = 1.9 * distance / (0.33 * rig.limits.speed)
@@ -64,7 +64,7 @@ def move(rig: Rig, controller: Controller, begin: float, end: float, inertia: fl
 
 
 def brake(rig: Rig, controller: Controller, begin: float, speed: float, inertia: float) -> Step:
-    """A closed-loop stop from a speed."""
+    """Return a closed-loop stop from a speed."""
     count = samples(rig, max(abs(speed) * inertia / (PUSH * rig.limits.torque), 0.1))
     t = rig.sample_time * np.arange(1, count + 1)
     end = count * rig.sample_time
@@ -75,7 +75,7 @@ def brake(rig: Rig, controller: Controller, begin: float, speed: float, inertia:
 def uniform(
     rig: Rig, begin: float, speed: float, travel: float, inertia: float
 ) -> tuple[Array, Array, float]:
-    """Setpoints that speed up, and those at a constant speed over a travel; and where they end, rad."""
+    """Return setpoints that accelerate, those at constant speed over a travel, and the final position, rad."""
     dt = rig.sample_time
     rise = samples(rig, max(abs(speed) * inertia / (PUSH * rig.limits.torque), 0.1))
     t = dt * np.arange(1, rise + 1)
@@ -93,16 +93,16 @@ def uniform(
 def speed_up(
     rig: Rig, controller: Controller, begin: float, speed: float, inertia: float
 ) -> tuple[Step, float]:
-    """A closed-loop step from rest to a speed, which is then held for a second; and where it ends, rad."""
+    """Return a closed-loop step from rest to a speed, kept for a second, and the final position, rad."""
     ramp, level, end = uniform(rig, begin, speed, abs(speed), inertia)
     return Step(np.concatenate([ramp, level]), controller), end
 
 
 def rough_inertia(rig: Rig) -> Generator[Step, Array, tuple[float, float]]:
-    """A first idea of the inertia and of the torque that moves the axis, without knowing anything.
+    """Estimate roughly the inertia and the torque that moves the axis, without prior knowledge.
 
-    A ramp finds the torque at which it moves; a push of twice that and the coasting after it give two accelerations,
-    whose sum is the push over the inertia, whatever friction is.
+    A ramp gives the torque at which it moves; a push of twice that and the coasting after it give an acceleration and a
+    deceleration. Their sum is the push divided by the inertia, independent of friction.
     """
     dt, top = rig.sample_time, ROOM * rig.limits.torque
     rows = yield Step(setpoints(round(2.0 / dt), torque=np.linspace(0.0, top, round(2.0 / dt))), travel=0.05)
@@ -127,7 +127,7 @@ def _acceleration(position: Array, dt: float) -> float:
 
 
 def _braking(position: Array, dt: float) -> float:
-    """Deceleration while it coasts, from the part before it stops."""
+    """Return the deceleration while it coasts, from the part before it stops."""
     total = float(position[-1] - position[0])
     moving = np.flatnonzero(np.abs(position - position[0]) < 0.85 * abs(total))
     part = position[: max(int(moving[-1]) + 1 if moving.size else 0, 6)]

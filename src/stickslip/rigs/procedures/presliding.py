@@ -14,7 +14,7 @@ from stickslip.rigs.procedures.moves import now, samples
 from stickslip.rigs.rig import Rig, setpoints
 
 LEAST = 200
-"""Rows of a cycle."""
+"""Fewest rows of a cycle."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Presliding(Procedure):
     """Options of the procedure.
 
     ``amplitude`` in N·m (thesis: 0.18 dry, 0.13 greased), ``frequency`` in Hz, ``cycles``, and ``average``, the samples
-    of one row of the record: fewer where a cycle would have less than `LEAST` rows.
+    of one row of the record: fewer if a cycle would have less than `LEAST` rows.
     """
 
     name: ClassVar[str] = "presliding"
@@ -35,24 +35,24 @@ class Presliding(Procedure):
     farthest: float = 0.01
 
     def rows_of(self, rig: Rig) -> int:
-        """Samples of one row."""
+        """Return the samples of one row."""
         return max(1, min(self.average, math.floor(1.0 / (LEAST * self.frequency * rig.sample_time))))
 
     def plan(self, rig: Rig) -> Plan:
-        """The cycles."""
+        """Plan the cycles."""
         seconds = self.cycles / self.frequency
         return Plan(
             seconds + 1.0, self.farthest, 2.0 * math.pi * self.frequency * self.farthest, self.amplitude,
-            (f"{self.cycles:g} cycles of {self.amplitude:g} N·m at {self.frequency:g} Hz, the loop open",), 1.0,
+            (f"{self.cycles:g} cycles of {self.amplitude:g} N·m at {self.frequency:g} Hz, open loop",), 1.0,
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:
-        """From rest, without a loop."""
+        """Generate the steps: from rest, open loop."""
         yield now(rig)
         count = samples(rig, self.cycles / self.frequency)
         t = rig.sample_time * np.arange(1, count + 1)
         torque = self.amplitude * np.sin(2.0 * math.pi * self.frequency * t)
-        # Beyond the travel the axis has broken away, and the step ends.
+        # Beyond this travel the axis has broken away, and the step ends.
         yield Step(
             setpoints(count, torque=torque), keep=True, average=self.rows_of(rig), pause=1.0, travel=self.farthest,
             label=f"{self.amplitude:g} N·m",
@@ -60,7 +60,7 @@ class Presliding(Procedure):
         yield Step(setpoints(round(0.2 / rig.sample_time)))
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """It moved by more than an encoder shows as noise, and did not break away."""
+        """Check that it moved by more than the encoder's noise, and did not break away."""
         moved = float(np.ptp(record["position"]))
         row = self.rows_of(rig) * rig.sample_time
         full = float(record.time[-1] - record.time[0]) + row >= 0.98 * self.cycles / self.frequency

@@ -16,7 +16,7 @@ from stickslip.rigs.rig import Rig
 
 @dataclass(frozen=True)
 class Repeat(Track):
-    """Options of `track`; ``times``, and the ``interval`` between two beginnings in s."""
+    """Options of `track`; ``times``, and the ``interval`` between two starts in s."""
 
     name: ClassVar[str] = "repeat"
     title: ClassVar[str] = "the same tracking five times, ten minutes apart (4.4)"
@@ -26,7 +26,7 @@ class Repeat(Track):
     interval: float = 600.0
 
     def plan(self, rig: Rig) -> Plan:
-        """Every repetition."""
+        """Plan every repetition."""
         one = Track.plan(self, rig)
         text = (*one.text, f"{self.times} times, {self.interval:g} s from one start to the next")
         return replace(
@@ -35,13 +35,13 @@ class Repeat(Track):
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:
-        """`Track.steps`, with pauses in between."""
+        """Generate the steps of `Track`, with pauses in between."""
         rest = max(self.interval - Track.plan(self, rig).duration, 0.0)
         for i in range(self.times):
             yield from Track.steps(replace(self, wait=rest if i else self.wait), rig)
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """The spread of the errors from run to run."""
+        """Report the spread of the errors from run to run."""
         n = len(record) // self.times
         error = (record["position_reference"] - record["position"])[: n * self.times].reshape(self.times, n)
         each: Any = (error**2).mean(axis=1) ** 0.5

@@ -1,7 +1,7 @@
 """Resonance: white torque noise while the axis runs and while it sticks, for the response of the drive's own loop.
 
-Modes bound the bandwidth of a position loop, and they lie elsewhere while the contact sticks than while it slides. So
-both are excited: over a running speed that never reverses, held by a slow loop, and at rest far below break-away.
+Modes limit the bandwidth of a position loop, and they differ between a sticking and a sliding contact. Therefore both
+are excited: at a running speed that never reverses, kept by a slow loop, and at rest far below break-away.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from stickslip.rigs.rig import Rig, setpoints
 Array = np.ndarray[Any, np.dtype[np.float64]]
 REFERENCE = COLUMNS.index("position_reference")
 HOLD = 4.0
-"""Hz, of the loop that holds the running speed."""
+"""Bandwidth of the loop that keeps the running speed, Hz."""
 CREST = 3.0
 """Largest value of the noise over its RMS."""
 SHARE = 0.08
-"""Of the torque limit, RMS of the noise at most."""
+"""Largest RMS of the noise, as a share of the torque limit."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +50,13 @@ class Resonance(Procedure):
     seed: int = 2
 
     def running(self, rig: Rig) -> float:
-        """RMS torque of the running part: a fourth of the speed is what its own speed may have."""
+        """Return the RMS torque of the running part: its speed ripple may be a quarter of the speed."""
         band = self.highest / rig.sample_time - self.lowest
         own = 2.0 * math.pi * self.inertia * math.sqrt(band * self.lowest)
         return min(SHARE * rig.limits.torque, 0.25 * abs(self.speed) * own)
 
     def plan(self, rig: Rig) -> Plan:
-        """Both parts."""
+        """Plan both parts."""
         top = CREST * max(self.running(rig), self.stuck)
         return Plan(
             2.0 * self.duration + 5.0, abs(self.speed) * (self.duration + 2.0), 1.5 * abs(self.speed),
@@ -70,7 +70,7 @@ class Resonance(Procedure):
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:
-        """Run and excite, stop, rest and excite."""
+        """Generate the steps: run and excite, stop, rest and excite."""
         loop, v = holder(rig, self.inertia, HOLD), self.speed
         rows = yield Step(setpoints(2), pause=1.0)
         running, end = speed_up(rig, loop, float(rows[-1, POSITION]), v, self.inertia)
@@ -88,7 +88,7 @@ class Resonance(Procedure):
         yield now(rig)
 
     def noise(self, rig: Rig, rms: float, place: int) -> Array:
-        """White from the lowest to the highest frequency, its peaks at most `CREST` times RMS."""
+        """Return white noise from the lowest to the highest frequency, with peaks of at most `CREST` times RMS."""
         count = samples(rig, self.duration)
         f = np.fft.rfftfreq(count, rig.sample_time)
         inside = (f >= self.lowest) & (f <= self.highest / rig.sample_time)
@@ -103,7 +103,7 @@ class Resonance(Procedure):
         return rms * np.clip(noise, -CREST, CREST)
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """The running part never reversed, and the other never broke away."""
+        """Check that the running part never reversed, and the other never broke away."""
         closed = record["velocity_reference"] != 0.0
         count = max(2, round(0.02 / rig.sample_time))
         run, still = record["position"][closed], record["position"][~closed]

@@ -1,4 +1,4 @@
-"""Whether an axis that should slide stood meanwhile, as far as its encoder tells."""
+"""Detect rest of an axis that should slide, within the resolution of its encoder."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ import numpy as np
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SLOW, RESTING = 0.2, 0.02
-"""Of the mean speed, below which the axis all but stands; share of the time from which it sticks and slips."""
+"""Share of the mean speed below which the axis counts as resting; share of the time above which it sticks and slips."""
 COUNTS = 3.0
-"""Of the encoder, over which a speed is taken at least: a count more or less at both ends is then no rest."""
+"""Encoder counts over which a speed is computed, at least: an error of one count at both ends is then not a rest."""
 
 
 def resting(time: Array, position: Array, velocity: float, resolution: float) -> float:
-    """Share of the time in which the axis all but stands.
+    """Return the share of the time in which the axis is nearly at rest.
 
     Parameters
     ----------
     time, position : array, shape (n,)
         s and rad, of a run at constant velocity.
     velocity : float
-        Its mean, rad/s, with its sign.
+        Mean velocity, rad/s, with sign.
     resolution : float
-        Of the encoder, rad: rests that are shorter than `COUNTS` of it take at that velocity are not seen.
+        Of the encoder, rad: rests shorter than the time of `COUNTS` counts at that velocity are not detected.
     """
     if time.size < 2:
         return 0.0

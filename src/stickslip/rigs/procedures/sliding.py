@@ -1,7 +1,7 @@
-"""Sliding: the velocities of thesis (4.1) and (4.3), from the greatest, 380 degrees each, both directions.
+"""Sliding: the velocities of thesis (4.1) and (4.3) in descending order, 380 degrees each, in both directions.
 
-A PID holds each velocity as a ramp of position (the thesis used an H-infinity controller). The torque of a revolution
-is averaged by `stickslip.identify.sliding.segments`; the first 20 degrees are its transient.
+A PID keeps each velocity as a ramp of the position (the thesis used an H-infinity controller). The torque of a
+revolution is averaged by `stickslip.identify.sliding.segments`; the first 20 degrees are its transient.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from stickslip.rigs.rig import Rig, setpoints
 DRY = (1.4, 1.2, 1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.08, 0.06, 0.04, 0.02)
 """rad/s, thesis eq. 4.1"""
 ROWS, LONGEST = 2000, 0.02
-"""Rows of a velocity's record, about, and the longest that one may last, s: sticking must show in them."""
+"""Approximate number of rows for each velocity, and longest duration of a row, s: sticking must be visible in them."""
 SHORT = 0.5
-"""s of rest before the way back."""
+"""Rest before the way back, s."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,11 @@ class Sliding(Procedure):
 
     @property
     def speeds(self) -> tuple[float, ...]:
-        """From the greatest, rad/s."""
+        """Velocities in descending order, rad/s."""
         return tuple(sorted((abs(v) for v in self.velocities), reverse=True))
 
     def plan(self, rig: Rig) -> Plan:
-        """Every velocity in both directions."""
+        """Plan every velocity in both directions."""
         travel = math.radians(self.degrees + 3.0)
         rise = [max(v * self.inertia / (0.15 * rig.limits.torque), 0.1) for v in self.speeds]
         total = 2.0 * sum(travel / v + 2.0 * r + 0.3 for v, r in zip(self.speeds, rise, strict=True))
@@ -60,17 +60,17 @@ class Sliding(Procedure):
             ROOM * rig.limits.torque,
             (
                 f"{len(self.speeds)} velocities from {max(self.speeds):g} to {min(self.speeds):g} rad/s, "
-                f"{self.degrees:g} degrees forth and back each",
+                f"{self.degrees:g} degrees in each direction",
             ),
             (self.rest + SHORT) * len(self.speeds),
-            # One velocity at a time, and of all the averaged rows.
+            # Memory: one velocity at a time, and the averaged rows of all.
             travel / min(self.speeds) + max(rise) + total * min(1.0, rig.sample_time / self.longest),
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:
-        """Forth and back with each velocity."""
+        """Generate the steps: each velocity in both directions."""
         loop = holder(rig, self.inertia, self.bandwidth)
-        # A little more, so that what is left after the transient is a whole revolution in the averaged rows too.
+        # Slightly more, so the averaged rows after the transient still contain a whole revolution.
         travel = math.radians(self.degrees + 3.0)
         for speed in self.speeds:
             for direction in (1.0, -1.0):
@@ -90,7 +90,7 @@ class Sliding(Procedure):
         yield now(rig)
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """The mean speed of the last revolution was held within 1 %; its ripple is reported."""
+        """Check that the mean speed of the last revolution is within 1 %, and report its ripple."""
         out: list[Check] = []
         reference = record["velocity_reference"]
         edges = np.flatnonzero(np.abs(np.diff(reference)) > 1e-9 * np.abs(reference[:-1])) + 1
@@ -111,11 +111,11 @@ class Sliding(Procedure):
             return Check(f"{v:g} rad/s", False, "the axis did not travel a revolution")
         mean = float((x[-1] - x[0]) / (t[-1] - t[0]))
         speed = np.diff(x) / np.diff(t)
-        # A row is the mean of some samples: its least step is a count over their number.
+        # A row is the mean of some samples: its smallest step is a count divided by their number.
         count = round(float(np.median(np.diff(t))) / sample_time) * encoder_step(position)
         ripple, still = float(np.std(speed)), resting(t, x, v, count)
         words = (
-            f"; it sticks and slips, {100.0 * still:.2g} % of the time all but at rest"
+            f"; it sticks and slips, {100.0 * still:.2g} % of the time nearly at rest"
             if still > RESTING
             else ""
         )

@@ -1,8 +1,8 @@
-"""Standstill map: the axis is held at places around the revolution, forward and back, for `identify --method cogging`.
+"""Standstill map: hold the axis at places around the revolution, in both directions, for `identify --method cogging`.
 
-What the drive gives at rest is cogging plus friction with the sign of the way that led there; nothing moves, so that no
-inertia, no viscous friction and no speed ripple take part. It is slower than rotations, and the place for axes whose
-cogging is too large to be turned through slowly.
+The drive's torque at rest is cogging plus friction with the sign of the direction of approach. Nothing moves, so
+inertia, viscous friction and speed ripple have no effect. It takes longer than rotations, and is meant for axes whose
+cogging is too large for slow rotations.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from stickslip.rigs.procedures.moves import ROOM, holder, now, samples, smooth
 from stickslip.rigs.rig import Rig, setpoints
 
 ROWS = 4
-"""Of each place; the first one is dropped: the loop settles in it."""
+"""Rows of each place; the first is dropped, because the loop settles in it."""
 HELD = 0.95
-"""Of the places, which must be held within a spacing."""
+"""Share of the places that must be held within a spacing."""
 
 
 @dataclass(frozen=True)
 class Standstill(Procedure):
     """Options of the procedure.
 
-    ``places`` around a turn, ``degrees`` travelled each way (a little more than a turn: what follows the turn-round is
-    left out), ``hold`` in s at a place and ``go`` in s from one to the next, ``inertia`` in kg·m² and ``bandwidth`` in
-    Hz of the loop.
+    ``places`` per revolution, ``degrees`` travelled in each direction (slightly more than a revolution, because rows
+    after a reversal are left out), ``hold`` in s at a place and ``go`` in s from one to the next, ``inertia`` in kg·m²
+    and ``bandwidth`` in Hz of the loop.
     """
 
     name: ClassVar[str] = "standstill"
@@ -46,29 +46,29 @@ class Standstill(Procedure):
 
     @property
     def spacing(self) -> float:
-        """Between two places, rad."""
+        """Distance between two places, rad."""
         if self.places < 8:
-            raise InputError(f"standstill: places = {self.places} hold no order; give 8 or more")
+            raise InputError(f"standstill: places = {self.places} resolve no order; give 8 or more")
         return 2.0 * math.pi / self.places
 
     @property
     def count(self) -> int:
-        """Places of one way."""
+        """Number of places in one direction."""
         return max(2, round(math.radians(self.degrees) / self.spacing))
 
     def plan(self, rig: Rig) -> Plan:
-        """All places in both directions."""
+        """Plan all places in both directions."""
         return Plan(
             2.0 * self.count * (self.hold + self.go) + 1.0, self.count * self.spacing,
             1.9 * self.spacing / self.go, ROOM * rig.limits.torque,
             (
-                f"{self.count} places, {math.degrees(self.spacing):.3g} degrees apart, forth and back: "
-                f"go there in {self.go:g} s, hold for {self.hold:g} s",
+                f"{self.count} places, {math.degrees(self.spacing):.3g} degrees apart, in both directions: "
+                f"move there in {self.go:g} s, hold for {self.hold:g} s",
             ),
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:
-        """Once around in each direction."""
+        """Generate the steps: once around in each direction."""
         loop = holder(rig, self.inertia, self.bandwidth)
         rows = yield now(rig)
         here = float(rows[-1, POSITION])
@@ -86,7 +86,7 @@ class Standstill(Procedure):
         yield now(rig)
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """The places were held."""
+        """Check that the places were held."""
         off = np.abs(record["position"] - record["position_reference"])
         share = float(np.mean(off < self.spacing))
         return (

@@ -1,4 +1,4 @@
-"""Stick-slip: a sinusoidal torque that breaks away in both directions, the loop open (thesis 4.3.1.1.4)."""
+"""Stick-slip: a sinusoidal torque that breaks away in both directions, open loop (thesis 4.3.1.1.4)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from stickslip.rigs.rig import Rig, setpoints
 class Stickslip(Procedure):
     """Options: ``amplitude`` in N·m (thesis: 0.45 dry, 0.35 greased), ``frequency`` in Hz, ``cycles``.
 
-    ``average`` is the number of samples of a row: single counts would look like motion and rest in turn.
+    ``average`` is the number of samples per row: single counts would look like alternating motion and rest.
     """
 
     name: ClassVar[str] = "stickslip"
@@ -30,15 +30,15 @@ class Stickslip(Procedure):
     average: int = 4
 
     def plan(self, rig: Rig) -> Plan:
-        """The cycles; the speed is what friction leaves of the torque, which is not known beforehand."""
+        """Plan the cycles; the speed depends on friction and is not known in advance."""
         seconds = self.cycles / self.frequency
         return Plan(
             seconds + 1.0, 0.5 * rig.limits.speed * seconds, 0.0, self.amplitude,
-            (f"{self.cycles:g} cycles of {self.amplitude:g} N·m at {self.frequency:g} Hz, the loop open",), 1.0,
+            (f"{self.cycles:g} cycles of {self.amplitude:g} N·m at {self.frequency:g} Hz, open loop",), 1.0,
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:
-        """From rest, without a loop."""
+        """Generate the steps: from rest, open loop."""
         yield now(rig)
         count = samples(rig, self.cycles / self.frequency)
         t = rig.sample_time * np.arange(count)
@@ -53,7 +53,7 @@ class Stickslip(Procedure):
         yield Step(setpoints(round(0.5 / rig.sample_time)))
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """It slipped in both directions, and stuck in between."""
+        """Check that it slipped in both directions, and stuck in between."""
         position = record["position"]
         width = max(1, self.average) * rig.sample_time
         k = max(1, round(0.02 / width))

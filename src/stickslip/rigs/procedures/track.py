@@ -1,4 +1,4 @@
-"""Track: the thesis's three references with any controller (4.3.1.2, 4.3.2.2)."""
+"""Track: follow the thesis's three references with any controller (4.3.1.2, 4.3.2.2)."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ REFERENCES = {
 """Thesis eqs. 3.23 and 3.24, and figure 3.17's step; with their durations, s."""
 RECOMMENDED = ("linear", "bandwidth", "damping", "inertia", "gain", "filter", "lead", "deadband", "offset",
                "inertia_feedforward")  # fmt: skip
-"""Options that a recommendation sets: it was simulated and measured with these, and with no others."""
+"""Options that a recommendation sets, because it was simulated and measured with these."""
 BESIDE_FILE = ("linear", "bandwidth", "damping", "compensator", "model", *RECOMMENDED[4:], "substeps")
-"""Options of what the file of a controller says itself."""
+"""Options that the file of a controller defines."""
 MADE = tuple(name for name in catalogue.CATALOGUE if name != "none")
 """Compensators of the catalogue."""
 HIGHEST = 0.1
-"""Of the sample rate, that a bandwidth may be"""
+"""Largest bandwidth, as a share of the sample rate"""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Track(Procedure):
 
     @classmethod
     def with_options(cls, given: Mapping[str, str]) -> Procedure:
-        """As `Procedure`; beside a recommendation nothing that it sets."""
+        """As `Procedure`; with a recommendation, options that it sets are refused."""
         beside = [name for name in RECOMMENDED if name in given]
         if beside and given.get("compensator") == "recommended":
             raise InputError(beside_recommended(beside[0], given[beside[0]]))
@@ -103,19 +103,19 @@ class Track(Procedure):
 
     @property
     def motion(self) -> tuple[Reference, float]:
-        """Reference and duration, s."""
+        """Return reference and duration, s."""
         if self.reference not in REFERENCES:
             raise UnknownName("reference", self.reference, REFERENCES)
         reference, seconds = REFERENCES[self.reference]
         return reference, self.duration or seconds
 
     def made(self, rig: Rig) -> Controller:
-        """The controller, with what it has room for below the rig's limit.
+        """Return the controller, limited to its share of the rig's torque limit.
 
         Raises
         ------
         InputError
-            If a name is unknown, the model is missing, or the file has no controller made of control laws.
+            If a name is unknown, the model is missing, or the file has no controller of control laws.
         """
         if not self.controller:
             return self.catalogued(rig) if self.compensator in MADE else self.compensated(rig)
@@ -124,12 +124,12 @@ class Track(Procedure):
         return dataclasses.replace(found, torque_limit=min(found.torque_limit, limit))
 
     def catalogued(self, rig: Rig) -> Controller:
-        """The controller with a compensator of the catalogue, made for the law that is believed of the machine.
+        """Return the controller with a compensator of the catalogue, designed for the machine's assumed law.
 
         Raises
         ------
         InputError
-            If no law is known, the compensator needs another one, or it has no place in the loop.
+            If no law is known, or the compensator requires another law or does not fit into the loop.
         """
         known = models_of(rig)
         law = self.law(rig) if self.model or "lugre" not in known else known["lugre"]
@@ -142,11 +142,11 @@ class Track(Procedure):
         return dataclasses.replace(catalogue.compensated(self.compensator, self.linear, belief), alone=False)
 
     def compensated(self, rig: Rig) -> Controller:
-        """The controller with a compensator that the options describe."""
+        """Return the controller with the compensator of the options."""
         if self.compensator == "recommended":
             loop = read_recommended(self.model)
             made = self.recommended(rig.name).compensated(rig)
-            # The rig measures by its own encoder, whatever counts it was tried with.
+            # The rig measures with its own encoder, not with that of the simulation.
             return dataclasses.replace(
                 made, gains=loop.linear, velocity_filter=loop.velocity_filter,
                 torque_limit=min(made.torque_limit, loop.torque_limit), reference_velocity=loop.reference_velocity,
@@ -182,12 +182,12 @@ class Track(Procedure):
         return Controller(gains, compensator, limit, rig.sample_time)
 
     def recommended(self, machine: str) -> Track:
-        """This with what the file of the model recommends; without a filter where the file names none.
+        """Return this with the recommendation of the model's file; without a filter if the file has none.
 
         Raises
         ------
         InputError
-            If the file recommends nothing, or for another machine, or an option that it sets was given too.
+            If the file has no recommendation, is for another machine, or an option that it sets is also given.
         """
         usual = {f.name: f.default for f in dataclasses.fields(Track)}
         for name in RECOMMENDED:
@@ -195,7 +195,7 @@ class Track(Procedure):
                 raise InputError(beside_recommended(name, getattr(self, name)))
         if not self.model.endswith(".toml"):
             raise InputError(
-                f"model = {self.model!r} recommends nothing; give the recommended.toml of `stickslip rig commission`"
+                f"model = {self.model!r} has no recommendation; give the recommended.toml of `stickslip rig commission`"
             )
         found = read_recommended(self.model)
         if found.machine and machine_in(found.machine) != machine_in(machine):
@@ -212,14 +212,14 @@ class Track(Procedure):
         )  # fmt: skip
 
     def angle(self) -> AngleMap:
-        """What the file of the model knows of the angle; nothing without a compensator."""
+        """Return the torque over the angle in the model's file; none without a compensator."""
         if self.compensator == "none" or not self.model.endswith(".toml"):
             return AngleMap()
         table = read_toml(Path(self.model))
         return AngleMap.of(table.table("angle").values) if table.has("angle") else AngleMap()
 
     def law(self, rig: Rig) -> Model:
-        """The compensator's model."""
+        """Return the compensator's model."""
         known = models_of(rig)
         if self.model in known:
             return known[self.model]
@@ -230,13 +230,13 @@ class Track(Procedure):
         )
 
     def samples(self, rig: Rig) -> Any:
-        """Positions, velocities and accelerations of the reference, shape (n, 3)."""
+        """Return positions, velocities and accelerations of the reference, shape (n, 3)."""
         reference, seconds = self.motion
         t = rig.sample_time * np.arange(samples(rig, seconds))
         return reference.sample(t)
 
     def plan(self, rig: Rig) -> Plan:
-        """The reference."""
+        """Plan the reference."""
         samples = self.samples(rig)
         self.learned_before(self.made(rig), rig)
         words = f"{self.linear} {self.bandwidth:g} Hz"
@@ -255,7 +255,7 @@ class Track(Procedure):
         )  # fmt: skip
 
     def steps(self, rig: Rig) -> Steps:
-        """From where the axis stands, as the reference's zero."""
+        """Generate the steps, with the current position as zero of the reference."""
         rows = yield Step(setpoints(round(0.05 / rig.sample_time)), pause=self.wait)
         samples = self.samples(rig)
         position = float(rows[-1, POSITION]) + samples[:, 0]
@@ -274,12 +274,12 @@ class Track(Procedure):
             write_learned(Path(self.learned), controller, learned, machine_in(rig.name))
 
     def learned_before(self, controller: Controller, rig: Rig) -> dict[str, Any]:
-        """What the file ``learned`` holds; nothing where there is none yet.
+        """Return the content of the file ``learned``; nothing if it does not exist yet.
 
         Raises
         ------
         InputError
-            If it is of another machine or other laws, or these learn nothing.
+            If it is of another machine or other laws, or these do not learn.
         """
         if not self.learned:
             return {}
@@ -288,7 +288,7 @@ class Track(Procedure):
         return read_learned(Path(self.learned), controller, machine_in(rig.name))
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """The error and the torque's saturation; both are what is looked for, so that neither fails."""
+        """Report error and torque saturation; both are results, so neither can fail."""
         error = record["position_reference"] - record["position"]
         rms, worst = math.sqrt(float(np.mean(error**2))), float(np.max(np.abs(error)))
         cut = float(np.mean(np.abs(record["torque_command"]) >= 0.999 * ROOM * rig.limits.torque))
@@ -302,18 +302,18 @@ class Track(Procedure):
 
 
 def models_of(rig: Rig) -> dict[str, Model]:
-    """The laws that are believed of a virtual rig's machine, by name."""
+    """Return the assumed laws of a virtual rig's machine, by name."""
     machine: Any = getattr(rig, "machine", None)
     return dict(machine.models) if machine is not None else {}
 
 
 def machine_in(rig: str) -> str:
-    """The machine of a rig's name, whatever imperfections were switched off."""
+    """Return the machine from a rig's name, without the list of imperfections switched off."""
     return rig.partition(" without ")[0]
 
 
 def beside_recommended(name: str, value: object) -> str:
-    """What is wrong with an option that the recommendation sets."""
+    """Return the error for an option that the recommendation sets."""
     return (
         f"{name} = {value} cannot be combined with compensator = recommended, which sets it; leave it out, or "
         "give compensator = "

@@ -6,7 +6,7 @@ import { run } from "./jobs.js";
 import { ensured, here, link } from "./store.js";
 
 const OTHER = [[/\.(xlsx?|xlsm|ods|numbers)$/i, "a spreadsheet: save its sheet as CSV and drop that"], [/\.(zip|7z|rar|tar|tgz)$/i, "an archive: unpack it and drop the logs in it"],
-  [/\.(png|jpe?g|gif|bmp|svg|pdf|html?|docx?|pptx?)$/i, "no log: give the file with the numbers that it was made from"]];
+  [/\.(png|jpe?g|gif|bmp|svg|pdf|html?|docx?|pptx?)$/i, "not a log: drop the file with the underlying numbers"]];
 const CODE = /\.(toml|py)$/i;
 const FORMATS = "CSV, MAT, HDF5, Parquet, NumPy, TDMS, MDF, ROS bags, JSON";
 
@@ -18,7 +18,7 @@ export function zone() {
     h("p", { class: "big" }, "Drop logs here"),
     h("p", {}, "or ", h("label", { for: "files", htmlFor: "files", class: "button" }, "choose files"), input, " or ",
       h("button", { type: "button", onclick: () => example(state) }, "try the example log")),
-    h("p", { class: "hint" }, `${FORMATS}; or a model, study or rig (TOML, with what it names). They stay on this machine.`), state);
+    h("p", { class: "hint" }, `${FORMATS}; or a model, study or rig (TOML, with the files that it names). They stay on this machine.`), state);
   for (const kind of ["dragenter", "dragover"]) box.addEventListener(kind, () => box.classList.add("over"));
   for (const kind of ["dragleave", "drop"]) box.addEventListener(kind, () => box.classList.remove("over"));
   box.addEventListener("drop", (event) => take([...event.dataTransfer.files], state));
@@ -53,7 +53,7 @@ async function unzipped(file) {
     const whole = await new Response(file.stream().pipeThrough(new DecompressionStream("gzip"))).blob();
     return new File([whole], file.name.slice(0, -3));
   } catch {
-    throw new Error(`${file.name} ends in .gz, but it cannot be unpacked; give it again, or unpacked.`);
+    throw new Error(`${file.name} ends in .gz but cannot be unpacked; drop it again, or unpacked.`);
   }
 }
 
@@ -68,7 +68,7 @@ async function sent(files, state) {
     const texts = await Promise.all(files.map(async (f) => ({ name: f.name, text: await f.text() })));
     const made = await post(here("/sent"), { files: texts });
     const target = link({ models: "model", studies: "study", rigs: "rig" }[made.kind], made.id);
-    await run(made.job, `Looking at ${main.name}`);
+    await run(made.job, `Reading ${main.name}`);
     line.remove();
     location.hash = target;
   } catch (error) {

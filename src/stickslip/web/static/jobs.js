@@ -26,7 +26,7 @@ export function run(id, title) {
   if (followed.has(id)) return followed.get(id).promise;
   const base = here(`/jobs/${id}`);
   const words = h("span", { class: "what" }, title);
-  const said = h("span", { class: "said" }, "waiting for its turn");
+  const said = h("span", { class: "said" }, "waiting");
   const clock = h("span", { class: "clock" }, "0 s");
   const bar = h("progress", { "aria-label": title, max: 1 });
   const cancel = h("button", { type: "button", class: "quiet",

@@ -43,8 +43,8 @@ async function show() {
 
 function locked() {
   return [h("h1", {}, "Open the address with its token"),
-    h("p", {}, "This page answers only to the address that ", h("code", {}, "stickslip web"),
-      " printed, to its end: the part behind # is the key. Copy it whole from the terminal.")];
+    h("p", {}, "This page opens only with the full address that ", h("code", {}, "stickslip web"),
+      " printed: the part after # is the key. Copy all of it from the terminal.")];
 }
 
 function navigation(view) {

@@ -32,11 +32,11 @@ export function ask(kind, item) {
       fill(state, complaint(error));
     }
   } }, "Delete it, run nothing");
-  return h("section", { class: "ask" }, h("h2", {}, "It asks to run Python code"),
-    h("p", {}, h("strong", {}, name), ` (${text.split("\n").length} lines) came with it. Nothing of it has run yet. Code that runs can do all that you can on this machine: read and change your files, and reach the network. `
-      + "Read it, or ask whoever sent it, before you let it."),
+  return h("section", { class: "ask" }, h("h2", {}, "It requires Python code"),
+    h("p", {}, h("strong", {}, name), ` (${text.split("\n").length} lines) came with it and has not run yet. Code has all your rights on this machine: it can read and change your files, and reach the network. `
+      + "Review it, or ask the sender, before you allow it."),
     h("pre", { tabindex: 0, "aria-label": `Code of ${name}` }, visible(text)),
-    h("p", { class: "hint" }, "SHA-256 ", h("code", {}, sha256), ". You approve this code until it changes, wherever a file names it, also on the command line."),
-    h("p", { class: "row tick" }, read, h("label", { for: "code-read", htmlFor: "code-read" }, "I have read it and trust whoever sent it")),
+    h("p", { class: "hint" }, "SHA-256 ", h("code", {}, sha256), ". Your approval is valid until the code changes, for every file that names it, also on the command line."),
+    h("p", { class: "row tick" }, read, h("label", { for: "code-read", htmlFor: "code-read" }, "I have reviewed it and trust the sender")),
     h("div", { class: "row" }, refuse, allow), state);
 }

@@ -11,7 +11,7 @@ export async function show(box) {
   box.append(h("h1", {}, "Has the friction changed?"));
   if (models.length < 2) {
     const coming = store.project.jobs.filter((j) => ["waiting", "running"].includes(j.state) && store.project.models.some((m) => m.id === j.item));
-    const said = h("p", {}, `Two models with a whole law are compared; this project has ${models.length === 1 ? "one" : "none"}. ${coming.length ? "What is being identified joins them when it is done." : "Identify another log, or the rest of this one."}`);
+    const said = h("p", {}, `You need two complete models; this project has ${models.length === 1 ? "one" : "none"}. ${coming.length ? "Running identifications are added when they finish." : "Identify another log, or the rest of this one."}`);
     box.append(said);
     // Once, and only where this is still what is looked at: a view shown since keeps what was typed and compared there.
     Promise.race(coming.map((job) => run(job.id, job.title))).then(() => said.isConnected && dispatchEvent(new Event("stickslip-show")));
@@ -42,8 +42,8 @@ export async function show(box) {
 
 function told(found) {
   const row = (c) => h("tr", {}, h("th", { scope: "row" }, c.name), h("td", {}, number(c.first)), h("td", {}, number(c.second)), h("td", {}, c.unit),
-    h("td", {}, c.percent === null ? `${number(c.second - c.first)} ${c.unit}` : `${c.percent.toFixed(1).replace("-", "−")} %`), h("td", { class: c.changed ? "bad" : "good" }, c.changed ? "changed" : "not shown to have changed"));
+    h("td", {}, c.percent === null ? `${number(c.second - c.first)} ${c.unit}` : `${c.percent.toFixed(1).replace("-", "−")} %`), h("td", { class: c.changed ? "bad" : "good" }, c.changed ? "changed" : "no significant change"));
   const table = (title, rows) => rows.length ? [h("h3", {}, title), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": title }, h("table", {}, h("thead", {}, h("tr", {}, ["quantity", "before", "after", "unit", "change", "verdict"].map((t) => h("th", { scope: "col" }, t)))), h("tbody", {}, rows.map(row))))] : [];
-  return h("section", { class: "verdict" }, h("h2", {}, found.changed ? "Yes, it has changed" : "No change is shown"), h("p", { class: "big" }, found.summary), table("Parameters", found.parameters), table("Torques", found.levels),
+  return h("section", { class: "verdict" }, h("h2", {}, found.changed ? "Yes, it has changed" : "No significant change"), h("p", { class: "big" }, found.summary), table("Parameters", found.parameters), table("Torques", found.levels),
     h("ul", {}, found.notes.map((n) => h("li", {}, n))));
 }

@@ -6,7 +6,7 @@ import { run } from "../jobs.js";
 import { here, link, store } from "../store.js";
 
 const METHODS = [["axis", "axis: inertia and friction, from any motion"], ["sliding", "sliding: constant velocities"], ["breakaway", "breakaway: torque ramps"],
-  ["presliding", "presliding: stiffness at rest (GMS)"], ["hysteresis", "hysteresis: a measured friction along its motion"], ["inertia", "inertia: frequency response"]];
+  ["presliding", "presliding: stiffness at rest (GMS)"], ["hysteresis", "hysteresis: friction measured along a motion"], ["inertia", "inertia: frequency response"]];
 
 // `open`: whether the options are needed, since the log has no torque.
 export function form(logs, open = false) {
@@ -34,15 +34,15 @@ export function form(logs, open = false) {
     }
     button.disabled = false;
   } },
-  h("div", { class: "row" }, button, h("p", { class: "hint" }, "Takes some ten seconds, once after an installation a minute; you may reload or look elsewhere meanwhile.")), state,
+  h("div", { class: "row" }, button, h("p", { class: "hint" }, "Takes about ten seconds, the first time after an installation a minute; you may reload or leave the page meanwhile.")), state,
   h("details", { open }, h("summary", {}, "Options"),
     h("div", { class: "grid" },
       field("Method", "method", { options: METHODS, value: "axis" }), field("Name of the result", "name", { maxLength: 120 }),
       field("Inertia, if you know it (kg·m² or kg)", "inertia", { type: "number", step: "any", min: 0 }),
-      field("Torque for each unit of the drive's signal", "drive_gain", { type: "number", step: "any" }, "Where the log holds no torque but a voltage or another command: N·m (or N) for each V."),
-      field("The drive's loop, if you know it", "loop", { placeholder: "kp=8,kd=0.08,limit=3", maxLength: 500 }, "Gains of the position loop that drove the log; a record of a closed loop then tells more."),
+      field("Torque for each unit of the drive's signal", "drive_gain", { type: "number", step: "any" }, "If the log has a voltage or another command instead of a torque: N·m (or N) per V."),
+      field("The drive's loop, if you know it", "loop", { placeholder: "kp=8,kd=0.08,limit=3", maxLength: 500 }, "Gains of the position loop during the log; with them a closed-loop record determines more."),
       field("Friction of its own in each direction", "per_direction", { type: "checkbox" }), field("Gravity of a pendulum", "pendulum", { type: "checkbox" }),
-      field("Outliers count less", "robust", { type: "checkbox" })),
+      field("Robust fit", "robust", { type: "checkbox" })),
     laws,
     others.length ? h("fieldset", {}, h("legend", {}, "Together with"), others.map((l) => field(l.name, `log+${l.id}`, { type: "checkbox" }))) : ""));
   return element;

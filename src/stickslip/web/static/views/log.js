@@ -13,14 +13,14 @@ const LEVELS = { error: "Error", warning: "Warning", note: "Note" };
 export async function show(box, id) {
   const log = store.project.logs.find((l) => l.id === id);
   if (!log) {
-    box.append(h("h1", {}, "This log is gone"), h("p", {}, h("a", { href: link() }, "Back to the project")));
+    box.append(h("h1", {}, "This log has been deleted"), h("p", {}, h("a", { href: link() }, "Back to the project")));
     return undefined;
   }
   const heading = h("h1", {}, log.name);
   const job = store.project.jobs.find((j) => j.item === id && !["done", "failed", "cancelled"].includes(j.state));
   if (log.state === "looking" && job) return early(box, heading, log, job);
   if (["reading", "coming", "looking"].includes(log.state)) {
-    box.append(heading, h("p", {}, job ? "This log is being read." : "The server was ended while it read this log; give it again."));
+    box.append(heading, h("p", {}, job ? "This log is being read." : "The server stopped while it was reading this log; drop it again."));
     if (job) run(job.id, job.title).then(() => dispatchEvent(new Event("stickslip-show")));
     return undefined;
   }
@@ -47,7 +47,7 @@ export async function show(box, id) {
 function facts({ format, view }) {
   const span = view.ends[1] - view.ends[0];
   return h("p", { class: "facts" }, `${format}, ${view.rows} rows`
-    + (view.by === "time" ? ` over ${number(span)} s${span > 0 ? `, ${number((view.rows - 1) / span)} Hz` : ""}` : "; times do not ascend, so rows are counted"));
+    + (view.by === "time" ? ` over ${number(span)} s${span > 0 ? `, ${number((view.rows - 1) / span)} Hz` : ""}` : "; times are not increasing, so rows are counted"));
 }
 
 // What was looked at of a log while the doctor was at work; it stays in sight when he has done.
@@ -57,7 +57,7 @@ const seen = new Map();
 async function early(box, heading, log, job) {
   const { planes } = (await get(here(`/logs/${log.id}`))).result;
   const plots = charts(log);
-  box.append(heading, facts(log), h("p", { class: "hint" }, "The doctor looks at it; what he finds, and the way to its friction, stand here as soon as he has done."),
+  box.append(heading, facts(log), h("p", { class: "hint" }, "The doctor is checking this log; its findings and the next step appear here."),
     h("section", { class: "signals" }, h("h2", {}, "Signals"), plots.bar, plots.all.map((p) => p.figure)), torque(planes, plots));
   run(job.id, job.title).then(() => {
     if (!box.isConnected) return;
@@ -114,7 +114,7 @@ function charts(log) {
     h("button", { type: "button", onclick: () => first?.zoom(0.5) }, "Zoom in"), h("button", { type: "button", onclick: () => first?.zoom(2) }, "Zoom out"),
     h("button", { type: "button", onclick: () => first?.pan(-0.3) }, "Earlier"), h("button", { type: "button", onclick: () => first?.pan(0.3) }, "Later"),
     h("button", { type: "button", onclick: () => show(view.ends) }, "All"),
-    h("p", { class: "hint" }, "Drag across a plot to choose a part. Click a plot, then use the wheel or the keys + − ← →."));
+    h("p", { class: "hint" }, "Drag across a plot to select a part. Click a plot, then use the wheel or the keys + − ← →."));
   const extra = [];
   return { all, bar, show, select, view, xLabel, extra, shown: () => shown, onselect: (f) => listeners.push(f),
     destroy() { [...all, ...extra].forEach((p) => p.destroy()); } };
@@ -156,9 +156,9 @@ function findings(log, plots) {
     return h("li", { class: f.level }, h("strong", {}, `${LEVELS[f.level]}: `), f.message, f.where ? ` (${f.where})` : "", f.remedy ? h("span", { class: "remedy" }, ` – ${f.remedy}`) : "", " ", look, correct);
   });
   const count = (level) => log.findings.filter((f) => f.level === level).length;
-  const words = log.errors ? `${log.errors} error${log.errors > 1 ? "s" : ""}: this log cannot be used as it is.`
-    : count("warning") ? `No error, ${count("warning")} warning${count("warning") > 1 ? "s" : ""}.` : "Nothing is wrong with this log.";
-  return h("section", { class: "findings" }, h("h2", {}, "What the doctor found"), h("p", { class: log.errors ? "bad" : count("warning") ? "fair" : "good" }, words),
+  const words = log.errors ? `${log.errors} error${log.errors > 1 ? "s" : ""}: this log cannot be used yet.`
+    : count("warning") ? `No error, ${count("warning")} warning${count("warning") > 1 ? "s" : ""}.` : "No problems found in this log.";
+  return h("section", { class: "findings" }, h("h2", {}, "Findings of the doctor"), h("p", { class: log.errors ? "bad" : count("warning") ? "fair" : "good" }, words),
     items.length ? h("ul", {}, items) : "");
 }
 
@@ -195,18 +195,18 @@ function cut(log, plots, again) {
   const parts = [];
   if (reading.start !== undefined) parts.push(`from ${number(reading.start, 6)} to ${number(reading.end, 6)} s is used`);
   for (const r of reading.leave_out ?? []) parts.push(r === "spikes" ? "spikes are left out" : `rows ${r} are left out`);
-  if (reading.unwrap) parts.push("the position is counted on where it jumps");
+  if (reading.unwrap) parts.push("the position is unwrapped at jumps");
   const spikes = log.findings.some((f) => f.code === "spikes" || f.message.includes("spikes"));
   const jumps = log.findings.some((f) => f.code === "position-wrap" || f.code === "position-jump");
-  return h("section", { class: "cut" }, h("h2", {}, "Which part is used"),
-    h("p", {}, parts.length ? `Of this log ${parts.join("; ")}.` : "All of it."), form, h("p", { class: "hint" }, `In ${unit}. Nothing is left out unless you say so here.`),
+  return h("section", { class: "cut" }, h("h2", {}, "Part of the log in use"),
+    h("p", {}, parts.length ? `${parts.join("; ")}.` : "The whole log."), form, h("p", { class: "hint" }, `In ${unit}. Nothing is left out automatically.`),
     h("div", { class: "row" },
       h("button", { type: "button", onclick: () => range() && plots.show(range()) }, "Zoom to it"),
       log.view.by === "time" && h("button", { type: "button", onclick: act((r) => ({ ...reading, start: r[0], end: r[1] })) }, "Use only this part"),
       !partial && h("button", { type: "button", onclick: act((r) => ({ ...reading, leave_out: [rows(r).join(":")] })) }, "Leave this part out"),
       spikes && h("button", { type: "button", onclick: () => again({ ...reading, leave_out: [...(reading.leave_out ?? []), "spikes"] }) }, "Leave spikes out"),
       jumps && h("button", { type: "button", onclick: () => again({ ...reading, unwrap: true }) }, "Count the position on"),
-      parts.length > 0 && h("button", { type: "button", onclick: () => again({ ...reading, start: undefined, end: undefined, leave_out: [], unwrap: false }) }, "Use all of it again")),
+      parts.length > 0 && h("button", { type: "button", onclick: () => again({ ...reading, start: undefined, end: undefined, leave_out: [], unwrap: false }) }, "Use the whole log again")),
     state);
 }
 
@@ -215,15 +215,15 @@ function cut(log, plots, again) {
 function torque(planes, plots) {
   const made = planes.filter((p) => p.x.length).map((p) => picture({
     title: `${p.y_name.replaceAll("_", " ")} against ${p.x_name}`, x_label: `${p.x_name} (${p.x_unit})`, y_label: `${p.y_name.replaceAll("_", " ")} (${p.y_unit})`,
-    message: "Every place where there is a sample", traces: [{ label: "", kind: "cloud", x: p.x, y: p.y }], height: 260,
+    message: "All samples", traces: [{ label: "", kind: "cloud", x: p.x, y: p.y }], height: 260,
   }));
   plots.extra.push(...made);
   return made.length ? h("section", {}, h("h2", {}, "Torque"), h("div", { class: "pair" }, made.map((p) => p.figure))) : "";
 }
 
 function chosen(log) {
-  const BY = { map: "you", profile: "profile", file: "the file's unit", name: "the column's name", drive: "a number of the drive's", assumed: "assumed" };
-  return h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Columns and units" }, h("table", {}, h("thead", {}, h("tr", {}, ["channel", "column", "unit", "unit known by"].map((t) => h("th", { scope: "col" }, t)))),
+  const BY = { map: "you", profile: "profile", file: "the file's unit", name: "the column's name", drive: "a number of the drive", assumed: "assumed" };
+  return h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Columns and units" }, h("table", {}, h("thead", {}, h("tr", {}, ["channel", "column", "unit", "source of the unit"].map((t) => h("th", { scope: "col" }, t)))),
     h("tbody", {}, log.chosen.map((c) => h("tr", {}, h("td", {}, c.channel.replaceAll("_", " ")), h("td", {}, c.column), h("td", {}, c.unit), h("td", { class: c.source === "assumed" ? "fair" : "" }, BY[c.source] ?? c.source))))));
 }
 
@@ -233,12 +233,12 @@ function identify(log) {
   if (!log.errors && !log.view.channels.some((c) => FORCES.includes(c.name))) {
     const drive = log.view.channels.some((c) => c.name === "voltage");
     const reference = log.view.channels.some((c) => c.name === "position_reference");
-    return h("section", { class: "next" }, h("h2", {}, "Identify its friction"), h("p", {}, "This log has no torque, force or current, and without one there is no friction to find. If one of its columns holds it, say which."),
+    return h("section", { class: "next" }, h("h2", {}, "Identify its friction"), h("p", {}, "This log has no torque, force or current, which identification requires. If one of its columns contains it, select it."),
       h("button", { type: "button", class: "main", onclick: showMapping }, "Choose the column"),
       drive || reference ? h("details", {}, h("summary", {}, "Without one"),
-        h("p", {}, drive ? "From the drive's voltage, with the torque for each unit of the signal. " : "", reference ? "From the reference of the position, with the gains of the drive's loop (kp=8,kd=0.08)." : ""),
+        h("p", {}, drive ? "From the drive's voltage, with the torque per unit of the signal. " : "", reference ? "From the reference of the position, with the gains of the drive's loop (kp=8,kd=0.08)." : ""),
         identifyForm([log.id], true)) : "");
   }
   return h("section", { class: "next" }, h("h2", {}, "Identify its friction"),
-    log.errors ? h("p", {}, "An error stands in the way: correct it below, or give another log.") : identifyForm([log.id]));
+    log.errors ? h("p", {}, "Fix the error below first, or use another log.") : identifyForm([log.id]));
 }

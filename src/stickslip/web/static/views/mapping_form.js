@@ -4,8 +4,8 @@ import { complaint, field, fill, h, values } from "../dom.js";
 
 const CHANNELS = ["time", "position", "position_reference", "velocity", "velocity_reference", "motor_torque", "current", "voltage", "supply",
   "friction_torque", "sensor_torque", "compensation_torque", "load", "temperature"];
-const NUMBERS = [["sample_time", "Time between rows (s), where the file has no times"], ["counts_per_rev", "Counts a revolution"], ["rated_torque", "Rated torque (N·m)"],
-  ["rated_current", "Rated current (A)"], ["torque_constant", "Torque constant (N·m/A)"], ["force_constant", "Force constant of a linear motor (N/A)"], ["gear_ratio", "Gear ratio"], ["pole_pairs", "Pole pairs, for speeds in eRPM"], ["lead", "Lead of the screw (m a revolution)"]];
+const NUMBERS = [["sample_time", "Time between rows (s), if the file has no times"], ["counts_per_rev", "Counts per revolution"], ["rated_torque", "Rated torque (N·m)"],
+  ["rated_current", "Rated current (A)"], ["torque_constant", "Torque constant (N·m/A)"], ["force_constant", "Force constant of a linear motor (N/A)"], ["gear_ratio", "Gear ratio"], ["pole_pairs", "Pole pairs, for speeds in eRPM"], ["lead", "Lead of the screw (m per revolution)"]];
 
 export function mapping(log, again) {
   const state = h("div");
@@ -39,9 +39,9 @@ export function mapping(log, again) {
     }
   } },
   h("div", { class: "wide labelled", tabindex: 0, role: "region", "aria-label": "Column and unit of every channel" }, h("table", { class: "mapping" }, h("thead", {}, h("tr", {}, ["channel", "column", "unit (deg, mNm, counts, ...)"].map((t) => h("th", { scope: "col" }, t)))), h("tbody", {}, rows))),
-  h("div", { class: "grid" }, numbers, field("Measured on the side of", "side", { options: [["", "motor, or as the file says"], ["load", "load"], ["motor", "motor"]], value: log.reading.side ?? "" })),
-  h("button", { type: "submit" }, "Read it so"), state);
-  return h("details", { open: !log.readable }, h("summary", {}, "Correct columns, units or numbers of the data sheet"), form);
+  h("div", { class: "grid" }, numbers, field("Measured on the side of", "side", { options: [["", "motor, or as in the file"], ["load", "load"], ["motor", "motor"]], value: log.reading.side ?? "" })),
+  h("button", { type: "submit" }, "Apply"), state);
+  return h("details", { open: !log.readable }, h("summary", {}, "Correct columns, units or data sheet values"), form);
 }
 
 // "q_deg:deg" as column and unit; a column's own name may hold a colon.

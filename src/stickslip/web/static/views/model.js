@@ -13,7 +13,7 @@ export async function show(box, id) {
   box.append(h("h1", {}, model.name));
   const job = store.project.jobs.find((j) => j.item === id && ["waiting", "running"].includes(j.state));
   if (job) {
-    box.append(h("p", {}, model.sent ? "It is being looked at." : "This is being identified."));
+    box.append(h("p", {}, model.sent ? "It is being read." : "This is being identified."));
     run(job.id, job.title).then(() => dispatchEvent(new Event("stickslip-show")));
     return undefined;
   }
@@ -22,7 +22,7 @@ export async function show(box, id) {
     return undefined;
   }
   if (model.state !== "done") {
-    const why = ["running", "looking"].includes(model.state) ? "the server was ended meanwhile; begin again" : model.problem || model.state;
+    const why = ["running", "looking"].includes(model.state) ? "the server stopped meanwhile; start again" : model.problem || model.state;
     box.append(h("p", { class: "problem", role: "alert" }, model.sent ? `It cannot be used: ${why}` : `Nothing was identified: ${why}`),
       h("p", {}, model.logs?.length ? h("a", { href: link("log", model.logs[0]) }, "Back to the log") : ""));
     return undefined;
@@ -43,7 +43,7 @@ export async function show(box, id) {
   const drawn = (p, height) => { const made = picture({ ...p, height }); plots.push(made); return made.figure; };
   if (first.length) box.append(h("section", {}, h("h2", {}, "The friction and the fit"), h("div", { class: "pair" }, first.map((p) => drawn(p, 320)))));
   box.append(numbers(found));
-  if (rest.length) box.append(h("section", {}, h("h2", {}, "What the model leaves"), h("div", { class: "pair" }, rest.map((p) => drawn(p, 300)))));
+  if (rest.length) box.append(h("section", {}, h("h2", {}, "Residuals"), h("div", { class: "pair" }, rest.map((p) => drawn(p, 300)))));
   box.append(notes(found, model));
   return () => plots.forEach((p) => p.destroy());
 }
@@ -52,10 +52,10 @@ export async function show(box, id) {
 function next(model, found) {
   const form = settingForm(model, true, found.axis);
   const known = found.estimates.some((e) => e.identified);
-  return h("section", { class: "next" }, h("h2", {}, "Which compensation to switch on"), known ? form
-    : [h("p", {}, "This log determines none of the numbers, and a setting made from it would be a guess. Measure once more first:"),
-      h("ul", {}, (found.measure_next.length ? found.measure_next : ["A record that slides both ways at several speeds."]).map((t) => h("li", {}, t))),
-      h("details", {}, h("summary", {}, "Try it nevertheless"), form)]);
+  return h("section", { class: "next" }, h("h2", {}, "Recommend a compensation"), known ? form
+    : [h("p", {}, "This log determines none of the numbers, so a setting would be a guess. First record:"),
+      h("ul", {}, (found.measure_next.length ? found.measure_next : ["A record with sliding in both directions at several speeds."]).map((t) => h("li", {}, t))),
+      h("details", {}, h("summary", {}, "Try it anyway"), form)]);
 }
 
 // A model from a file: what it says, and the way to a setting.
@@ -73,7 +73,7 @@ function sent(model) {
   return [h("p", { class: "facts" }, `From the file ${model.sent.join(", ")}: ${found.title}`),
     h("p", { class: "row" }, h("a", { class: "button", href: `/api${here(`/models/${model.id}/toml`)}`, download: "model.toml" }, "Download model.toml"),
       found.axis && found.registered && h("a", { class: "button", href: link("workbench", model.id) }, "Try it in the workbench")),
-    h("section", { class: "next" }, h("h2", {}, "Which compensation to switch on"), settingForm(model, found.trajectory, found.axis)),
+    h("section", { class: "next" }, h("h2", {}, "Recommend a compensation"), settingForm(model, found.trajectory, found.axis)),
     h("section", {}, h("h2", {}, "Numbers"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Parameters" }, h("table", {},
       h("thead", {}, h("tr", {}, ["parameter", "meaning", "value", "95 % interval", "unit"].map((t) => h("th", { scope: "col" }, t)))),
       h("tbody", {}, parameters.map(([name, meaning, value, unit]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, meaning), h("td", {}, copyable(several(value), value, name)), h("td", {}, interval(name)), h("td", {}, unit === "-" ? "" : unit)))))))];
@@ -93,11 +93,11 @@ function verdicts(found) {
   const interval = (e) => (e.lower === null || e.upper === null ? "interval unknown" : `${number(e.lower)} to ${number(e.upper)}`);
   return h("section", { class: "verdicts" },
     h("div", { class: "verdict" }, h("h2", {}, "Can it be trusted?"), h("p", { class: "big" }, found.answers.trust), h("ul", {}, found.answers.evidence.map((t) => h("li", {}, t)))),
-    h("div", { class: "verdict" }, h("h2", {}, "What is known"), found.answers.friction.map((t) => h("p", {}, t)),
+    h("div", { class: "verdict" }, h("h2", {}, "Identified"), found.answers.friction.map((t) => h("p", {}, t)),
       known.length ? h("ul", {}, known.map((e) => h("li", {}, `${e.name} = ${number(e.value)} ${e.unit} (${interval(e)})`))) : h("p", {}, "Nothing is identified.")),
-    h("div", { class: "verdict" }, h("h2", {}, "What is not"),
+    h("div", { class: "verdict" }, h("h2", {}, "Not identified"),
       open.length ? h("ul", {}, open.map((e) => h("li", {}, `${e.name}: ${e.verdict || "the data do not determine it"}`))) : h("p", {}, found.held?.length ? "Every other number is identified." : "Every number is identified.")),
-    h("div", { class: "verdict" }, h("h2", {}, "What to measure next"),
+    h("div", { class: "verdict" }, h("h2", {}, "Next measurement"),
       found.measure_next.length ? h("ul", {}, found.measure_next.map((t) => h("li", {}, t))) : h("p", {}, "Nothing more is needed for this law.")));
 }
 
@@ -109,12 +109,12 @@ function numbers(found) {
   const misfit = Object.entries(found.misfit).filter(([, v]) => v !== null);
   return h("section", {}, h("h2", {}, "Numbers"),
     h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Parameters" }, h("table", {}, h("thead", {}, h("tr", {}, ["parameter", "value", "95 % interval", "unit", "verdict"].map((t) => h("th", { scope: "col" }, t)))), h("tbody", {}, found.estimates.map(row), (found.held ?? []).map(given)))),
-    h("details", {}, h("summary", {}, "How well it fits, in numbers"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Misfit" }, h("table", {}, h("tbody", {}, misfit.map(([k, v]) => h("tr", {}, h("th", { scope: "row" }, k.replaceAll("_", " ")), h("td", {}, copyable(number(v, 5), v, k)))))))));
+    h("details", {}, h("summary", {}, "Misfit in numbers"), h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Misfit" }, h("table", {}, h("tbody", {}, misfit.map(([k, v]) => h("tr", {}, h("th", { scope: "row" }, k.replaceAll("_", " ")), h("td", {}, copyable(number(v, 5), v, k)))))))));
 }
 
 function notes(found, model) {
   const told = found.notes.filter((n) => !found.answers.told.includes(n));
   return h("section", {}, h("h2", {}, "Notes"), told.length ? h("ul", {}, told.map((n) => h("li", {}, n))) : h("p", {}, "None."),
-    h("details", {}, h("summary", {}, "As the command line prints it"), h("pre", { tabindex: 0 }, found.text)),
-    h("p", {}, "From ", (model.logs ?? []).map((l, i) => [i ? ", " : "", h("a", { href: link("log", l) }, store.project.logs.find((x) => x.id === l)?.name ?? "a log that is gone")])));
+    h("details", {}, h("summary", {}, "Output of the command line"), h("pre", { tabindex: 0 }, found.text)),
+    h("p", {}, "From ", (model.logs ?? []).map((l, i) => [i ? ", " : "", h("a", { href: link("log", l) }, store.project.logs.find((x) => x.id === l)?.name ?? "a deleted log")])));
 }

@@ -17,5 +17,5 @@ export function planned(found, begin) {
   return h("section", { class: "verdict" }, h("h2", {}, `What ${found.rig} will do`), facts.length ? h("p", { class: "facts" }, facts.join(", ")) : null, h("ul", {}, found.text.map((t) => h("li", {}, t))),
     h("p", {}, `Travel up to ${number(found.travel)} rad; ${speed}; torque up to ${number(found.torque)} N·m of ${number(found.limits.torque)}; up to ${number(found.duration, 3)} s, and ${number(found.pauses, 3)} s at rest.`),
     understood && h("p", { class: "row tick" }, understood, h("label", { for: "understood", htmlFor: "understood" }, h("strong", {}, sentence))),
-    h("p", { class: "row tick" }, arm, h("label", { for: "arm", htmlFor: "arm" }, "Arm the rig: I have read this, and nobody is in its way")), start);
+    h("p", { class: "row tick" }, arm, h("label", { for: "arm", htmlFor: "arm" }, "Arm the rig: I have read the plan and the machine is clear")), start);
 }

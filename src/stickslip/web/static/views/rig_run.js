@@ -22,7 +22,7 @@ export function begin(live, asked) {
   };
   addEventListener("keydown", keys, true);
   one.ended.push(() => removeEventListener("keydown", keys, true));
-  fill(live, h("div", { class: "row" }, one.halt, h("p", { class: "hint" }, "The keys Escape and space stop it, too. Closing or leaving this page stops it.")), one.state, one.signals.figures);
+  fill(live, h("div", { class: "row" }, one.halt, h("p", { class: "hint" }, "The keys Escape and space also stop it, and so does leaving this page.")), one.state, one.signals.figures);
   one.halt.focus();
   start(one);
   return { leave: () => { if (!one.over) { stop(one); over(one, "Left"); } one.signals.destroy(); } };
@@ -71,12 +71,12 @@ async function heard(one, frame, log) {
     return;
   }
   over(one, last(frame));
-  add(one.live, h("p", {}, h("a", { href: link("log", log), class: "button" }, "See the record")));
+  add(one.live, h("p", {}, h("a", { href: link("log", log), class: "button" }, "Show the record")));
   await refresh();
 }
 
 function last(frame) {
-  if (frame.killed) return "It did not end in time and was ended: the rig's own watchdog takes the torque away. See that it stands.";
+  if (frame.killed) return "It did not end in time and was killed: the rig's own watchdog removes the torque. Check that it stands still.";
   if (frame.end === "done") return `Done: ${frame.result.checks.filter((c) => c.passed).length} of ${frame.result.checks.length} checks passed.`;
   return frame.end === "cancelled" ? "Stopped: the torque is zero." : `Ended: ${frame.error}`;
 }

@@ -30,19 +30,19 @@ export function form(model, moves = true, inertia = true) {
   h("div", { class: "grid" },
     field("Bandwidth of the position loop (Hz)", "bandwidth", { type: "number", step: "any", min: 0.01, value: 10 }),
     field("Sample time of the drive (ms)", "sample_ms", { type: "number", step: "any", min: 0.001, value: 1 }),
-    field("Encoder, counts a revolution", "counts_per_rev", { type: "number", step: "any", min: 0, placeholder: "from the log" }, "Without one in the log: exact."),
+    field("Encoder counts per revolution", "counts_per_rev", { type: "number", step: "any", min: 0, placeholder: "from the log" }, "Default without one in the log: exact."),
     field("Torque limit (N·m)", "torque_limit", { type: "number", step: "any", min: 0, placeholder: "none" })),
-  h("div", { class: "row" }, button, h("p", { class: "hint" }, "Simulates candidates on axes sampled from the intervals: half a minute or so.")), state,
-  moves ? "" : h("p", { class: "hint" }, "The model holds no recorded motion: give the amplitude and frequency of a slow sinusoid, such as your axis makes, below."),
-  inertia ? "" : h("p", { class: "hint" }, "The model holds no inertia: give that of your axis below."),
+  h("div", { class: "row" }, button, h("p", { class: "hint" }, "Simulates candidates on axes sampled from the intervals: about half a minute.")), state,
+  moves ? "" : h("p", { class: "hint" }, "The model contains no motion: enter amplitude and frequency of a slow sinusoid that is typical of your axis below."),
+  inertia ? "" : h("p", { class: "hint" }, "The model contains no inertia: enter that of your axis below."),
   h("details", { open: !moves || !inertia }, h("summary", {}, "Options"), h("div", { class: "grid" },
     field("Linear controller", "linear", { options: [["PD", "PD"], ["PID", "PID"], ["PR", "PR"]], value: "PD" }),
     field("Damping of its poles", "damping", { type: "number", step: "any", min: 0.05, value: 1 }),
-    field("The drive's own loop instead", "loop", { maxLength: 500, placeholder: "kv=40,kvp=0.8,kvi=25,feed=1" }, "Then take away what is said of the bandwidth."),
-    field("The drive's reference velocity", "reference_velocity", { options: [["", "not known: both are simulated"], ["difference", "difference of two reference positions"], ["instant", "that of the trajectory at the sample"]], value: "" }),
-    field("Inertia, where the model has none (kg·m² or kg)", "inertia", { type: "number", step: "any", min: 0 }),
+    field("The drive's own loop instead", "loop", { maxLength: 500, placeholder: "kv=40,kvp=0.8,kvi=25,feed=1" }, "Then clear the bandwidth."),
+    field("The drive's reference velocity", "reference_velocity", { options: [["", "unknown: both are simulated"], ["difference", "difference of two reference positions"], ["instant", "that of the trajectory at the sample"]], value: "" }),
+    field("Inertia, if the model has none (kg·m² or kg)", "inertia", { type: "number", step: "any", min: 0 }),
     field("A slow sinusoid as the motion: amplitude (rad or m)", "amplitude", { type: "number", step: "any", min: 0 }),
     field("and its frequency (Hz)", "frequency", { type: "number", step: "any", min: 0 }),
-    field("Axes to confirm it on", "confirm", { type: "number", step: 1, min: 0, max: 1000, value: 39 }, "39 make the interval hold with 95 %."))));
+    field("Axes for confirmation", "confirm", { type: "number", step: 1, min: 0, max: 1000, value: 39 }, "39 give a 95 % interval."))));
   return element;
 }

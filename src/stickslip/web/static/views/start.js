@@ -10,11 +10,11 @@ export async function show(box) {
   const form = h("form", { class: "row", onsubmit: async (event) => {
     event.preventDefault();
     location.hash = `#/p/${(await post("/projects", { name: name.value })).id}`;
-  } }, h("label", { for: "new-name", htmlFor: "new-name" }, "A new project, named"), name, h("button", {}, "Make"));
+  } }, h("label", { for: "new-name", htmlFor: "new-name" }, "New project name"), name, h("button", {}, "Create"));
   box.append(
     h("section", { class: "welcome" }, h("h1", {}, "From a log to a setting"),
-      h("p", {}, "Drop the log of a servo axis here: time, position and torque are enough. You see what is in it and what is wrong with it, "
-        + "what its friction is and how sure that is, which compensation is safe to switch on, and download it for your drive."), zone()),
+      h("p", {}, "Drop the log of a servo axis here: time, position and torque are enough. You see its content and its problems, "
+        + "the friction with its uncertainty, and a compensation that is safe to switch on, to download for your drive."), zone()),
     h("section", {}, h("h2", {}, "Projects"),
       projects.length
         ? h("ul", { class: "cards" }, projects.map((p) => h("li", {}, h("a", { href: `#/p/${p.id}` }, p.name),

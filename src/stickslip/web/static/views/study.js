@@ -13,7 +13,7 @@ export async function show(box, id) {
   box.append(h("h1", {}, study.name), h("p", { class: "facts" }, `Sent: ${study.sent.join(", ")}`));
   const job = store.project.jobs.find((j) => j.item === id && ["waiting", "running"].includes(j.state));
   if (job) {
-    box.append(h("p", {}, job.kind === "look" ? "It is being looked at." : "It runs."));
+    box.append(h("p", {}, job.kind === "look" ? "It is being read." : "It is running."));
     run(job.id, job.title).then(() => dispatchEvent(new Event("stickslip-show")));
     return undefined;
   }
@@ -22,7 +22,7 @@ export async function show(box, id) {
     return undefined;
   }
   if (["failed", "cancelled", "looking", "running"].includes(study.state)) {
-    const why = { cancelled: "It was cancelled; runs that had finished are kept.", failed: study.problem }[study.state] ?? "The server was ended meanwhile.";
+    const why = { cancelled: "It was cancelled; finished runs are kept.", failed: study.problem }[study.state] ?? "The server stopped meanwhile.";
     box.append(h("p", { class: "problem", role: "alert" }, why));
   }
   const plots = [];
@@ -45,7 +45,7 @@ function begin(study) {
       fill(state, complaint(error));
       button.disabled = false;
     }
-  } }, study.state === "done" ? "Run it again" : "Run it");
+  } }, study.state === "done" ? "Run again" : "Run");
   const size = study.runs === undefined ? "" : `${study.runs} run${study.runs === 1 ? "" : "s"}, ${number(study.runs_for)} s simulated in all.`;
   return h("section", { class: "next" }, h("div", { class: "row" }, button, h("p", { class: "hint" }, size)), state);
 }
@@ -59,7 +59,7 @@ function simulation(found, plots) {
     return made.figure;
   });
   const names = Object.keys(found.metrics).filter((k) => found.metrics[k] !== null);
-  return h("section", {}, h("h2", {}, "What came of it"), h("div", { class: "pair" }, drawn),
+  return h("section", {}, h("h2", {}, "Results"), h("div", { class: "pair" }, drawn),
     h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Metrics" }, h("table", {}, h("thead", {}, h("tr", {}, ["metric", "value", "unit"].map((t) => h("th", { scope: "col" }, t)))),
       h("tbody", {}, names.map((k) => h("tr", {}, h("th", { scope: "row" }, metricName(k)), h("td", {}, number(found.metrics[k])), h("td", {}, unitOf(k))))))));
 }
@@ -67,7 +67,7 @@ function simulation(found, plots) {
 function table(study) {
   const { metrics, runs } = study.result.study;
   const base = `/api${here(`/studies/${study.id}/report`)}`;
-  return h("section", {}, h("h2", {}, "What came of it"),
+  return h("section", {}, h("h2", {}, "Results"),
     h("p", { class: "row" }, h("a", { class: "button", href: `${base}?show=1`, target: "_blank", rel: "noopener" }, "Open the report"), h("a", { class: "button", href: base, download: "report.html" }, "Download the report")),
     h("div", { class: "wide", tabindex: 0, role: "region", "aria-label": "Runs" }, h("table", {},
       h("thead", {}, h("tr", {}, ["run", ...metrics.map((m) => `${metricName(m)}${unitOf(m) ? ` (${unitOf(m)})` : ""}`)].map((t) => h("th", { scope: "col" }, t)))),

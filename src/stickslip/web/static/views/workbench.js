@@ -44,13 +44,13 @@ export async function show(box, model) {
     do {
       again = false;
       const began = performance.now();
-      status.textContent = last ? status.textContent : "The first simulation of a law compiles it: up to half a minute.";
+      status.textContent = last ? status.textContent : "The first simulation of a law compiles it, which takes up to half a minute.";
       try {
         const found = await post("/simulations", state);
         last = { ...found, label: "now" };
         fill(problem);
         const took = performance.now() - began;
-        status.textContent = took < 2000 ? `Simulated in ${Math.round(took)} ms.` : `Simulated in ${(took / 1000).toFixed(0)} s, its law compiled for the first time.`;
+        status.textContent = took < 2000 ? `Simulated in ${Math.round(took)} ms.` : `Simulated in ${(took / 1000).toFixed(0)} s, including compilation of its law.`;
         status.dataset.ms = String(Math.round(performance.now() - began));
         draw();
       } catch (error) {
@@ -78,8 +78,8 @@ export async function show(box, model) {
     const query = encodeURIComponent(JSON.stringify(state));
     fill(links, h("a", { class: "button", href: `/api/simulations/toml?case=${query}`, download: "case.toml" }, "Export as TOML"),
       h("a", { class: "button", href: `/api/simulations/python?case=${query}`, download: "case.py" }, "Export as Python"),
-      h("button", { type: "button", onclick: () => { kept.push({ ...last, label: `run ${kept.length + 1}` }); kept = kept.slice(-3); draw(); } }, "Keep this run beside"),
-      kept.length ? h("button", { type: "button", onclick: () => { kept = []; draw(); } }, "Forget kept runs") : "");
+      h("button", { type: "button", onclick: () => { kept.push({ ...last, label: `run ${kept.length + 1}` }); kept = kept.slice(-3); draw(); } }, "Pin run"),
+      kept.length ? h("button", { type: "button", onclick: () => { kept = []; draw(); } }, "Clear pinned runs") : "");
   }
 
   function forms_() {
@@ -98,8 +98,8 @@ export async function show(box, model) {
         slider(state, { name: "duration", meaning: "duration", unit: "s", positive: true, upper: 20 }, simulate)),
       group("Controller", choose("Linear part", state.controller.linear, [["PD", "PD"], ["PID", "PID"], ["PR", "PR"]], (v) => { state.controller.linear = v; }), plain(CONTROLLER, state.controller),
         choose("Compensator", state.controller.compensator, [["", "none"], ["feedforward", "feedforward"], ["feedback", "feedback"]], (v) => { state.controller.compensator = v; }),
-        state.controller.compensator ? [plain(COMPENSATOR, state.controller), h("p", { class: "hint" }, "The compensator believes the friction above, unless you freeze what it believes:"),
-          h("button", { type: "button", onclick: () => { state.believed = state.believed ? null : structuredClone(state.friction); forms_(); simulate(); } }, state.believed ? "Believe the friction above again" : "Freeze its law as it is now")] : ""));
+        state.controller.compensator ? [plain(COMPENSATOR, state.controller), h("p", { class: "hint" }, "The compensator uses the friction above unless you freeze its model:"),
+          h("button", { type: "button", onclick: () => { state.believed = state.believed ? null : structuredClone(state.friction); forms_(); simulate(); } }, state.believed ? "Use the friction above again" : "Freeze its model")] : ""));
   }
 
   forms_();
