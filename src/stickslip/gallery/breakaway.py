@@ -8,13 +8,11 @@ rates are those of Canudas de Wit et al. (1995): Fs = 1.5 N, Fc = 1 N, 1 kg.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
-from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.analysis_pictures import Drawn
+from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
 
 LEVELS = {"fs": 1.5, "fc": 1.0, "vs": 1e-3, "sigma2": 0.4}  # N, N, m/s, N·s/m
@@ -39,7 +37,7 @@ def breakaway(record: Record) -> float:
     return float(record["friction_torque"][resting].max())
 
 
-def main(path: Path) -> None:
+def picture() -> Drawn:
     """Draw break-away force over rate."""
     panel = Panel(
         [
@@ -49,8 +47,4 @@ def main(path: Path) -> None:
         "break-away force (N)", "rate of the applied force (N/s)", x_scale="log",
     )  # fmt: skip
     message = "From the static level of 1.5 N towards the Coulomb level of 1 N"
-    draw(path, "Break-away force falls with the rate of the force", message, [panel], 2.2)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "breakaway"))
+    return "Break-away force falls with the rate of the force", message, [panel], 2.2

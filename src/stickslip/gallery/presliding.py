@@ -8,13 +8,11 @@ force that pulses to one side, always below break-away, it drifts where GMS stan
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, law, respond, simulate
-from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.analysis_pictures import Drawn
+from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
 
 GMS = Model("gms", **law("gms").example)
@@ -57,7 +55,7 @@ def drift(record: Record) -> float:
     return float((now - then) / (end - half))
 
 
-def main(path: Path) -> None:
+def picture() -> Drawn:
     """Draw the loops and the drift."""
     loops = {name: loop(model) for name, model in (("GMS", GMS), ("LuGre", LUGRE))}
     pulses = {name: pulsed(model) for name, model in (("GMS", GMS), ("LuGre", LUGRE))}
@@ -84,8 +82,4 @@ def main(path: Path) -> None:
     message = (
         f"Under the pulsing torque LuGre creeps by {creep['LuGre']} µrad/s, GMS by {creep['GMS']} µrad/s"
     )
-    draw(path, "Hysteresis, memory and drift in pre-sliding", message, panels, 1.9)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "presliding"))
+    return "Hysteresis, memory and drift in pre-sliding", message, panels, 1.9
