@@ -4,6 +4,9 @@ The thesis excites the axis from rest, and finds its responses apart at low freq
 Here the axis runs, so that it never does: a damping loop holds the mean speed, and a run that slows to less than the
 least speed is refused. Power grows with the frequency up to the band's end, which moves the speed less than white
 noise does. Where the rig's torque or speed leaves no room for the currents asked for, all are lowered alike.
+
+``about = "rest"`` repeats the thesis's experiment, white noise without a loop: friction then sticks and changes its
+sign, and the responses to the two currents differ at low frequencies (figure 4.4).
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.errors import RigError
+from stickslip.errors import InputError, RigError
 from stickslip.record import Record
 from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
@@ -41,6 +44,9 @@ DAMPING = 20.0
 """Hz, where the damping loop and the inertia's own impedance are equal."""
 BIAS = 0.6
 """Of the torque limit, which running may take; else it runs slower."""
+ABOUT = ("speed", "rest")
+LEAST_MOTION = 0.01
+"""rad, beyond pre-sliding, which takes a milliradian or so."""
 CREST = 2.2
 """Largest value of the noise over its RMS."""
 
@@ -51,7 +57,7 @@ class Inertia(Procedure):
 
     ``current`` in A RMS, one record part each, ``torque_constant`` in N·m/A, ``band`` in Hz, ``speed`` the mean and
     ``least`` the least speed in rad/s (speed 0: chosen, at most half of what the rig allows), ``duration`` of each
-    part in s.
+    part in s, ``about`` "speed" or "rest".
     """
 
     name: ClassVar[str] = "inertia"
@@ -65,9 +71,17 @@ class Inertia(Procedure):
     least: float = 2.0
     duration: float = 120.0
     seed: int = 1
+    about: str = "speed"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.about not in ABOUT:
+            raise InputError(f"inertia: about = {self.about!r} must be {' or '.join(ABOUT)}")
 
     def plan(self, rig: Rig) -> Plan:
         """All parts one after the other."""
+        if self.about == "rest":
+            return self._plan_at_rest(rig)
         v = self.speed or 0.5 * rig.limits.speed
         total = len(self.current) * (self.duration + 12.0) + 12.0
         each = ", ".join(f"{c:g}" for c in self.current)
@@ -82,13 +96,35 @@ class Inertia(Procedure):
             3.0 * len(self.current),
         )  # fmt: skip
 
+    def _plan_at_rest(self, rig: Rig) -> Plan:
+        """Noise without a loop; how far it moves the axis is for friction to say, and the rig's limits end it."""
+        each = ", ".join(f"{c:g}" for c in self.current)
+        text = (
+            f"random currents of {each} A RMS up to {self.band:g} Hz, {self.duration:g} s each, the loop open"
+        )
+        most = CREST * max(self.current) * self.torque_constant
+        return Plan(
+            len(self.current) * (self.duration + 1.0), 0.0, 0.0, most, (text,), float(len(self.current))
+        )
+
     def steps(self, rig: Rig) -> Steps:
-        """A first idea, then speed up, excite, stop, for each current."""
+        """A first idea, then speed up, excite, stop, for each current; about rest the excitation alone."""
+        if self.about == "rest":
+            yield from self._excited_at_rest(rig)
+            return
         inertia, _ = yield from rough_inertia(rig)
         follow = holder(rig, inertia, 8.0)
         speed, bias = yield from self._running(rig, follow, inertia)
         for place, current in enumerate(self.current):
             yield from self._part(rig, follow, inertia, speed, bias, place, current)
+
+    def _excited_at_rest(self, rig: Rig) -> Steps:
+        yield now(rig)
+        count = samples(rig, self.duration)
+        for place, current in enumerate(self.current):
+            torque = self.noise(count, rig.sample_time, current * self.torque_constant, place)
+            yield Step(setpoints(count, torque=torque), keep=True, label=f"{current:.3g} A RMS", pause=1.0)
+            yield Step(setpoints(round(0.5 / rig.sample_time)))
 
     def _running(
         self, rig: Rig, follow: Controller, inertia: float
@@ -151,11 +187,12 @@ class Inertia(Procedure):
         return min(max(self.current) * self.torque_constant, 0.6 * room / CREST, slowest)
 
     def noise(self, count: int, dt: float, rms: float, place: int) -> Array:
-        """Noise with power in proportion to the frequency up to the band's end, its peaks at most `CREST` times RMS."""
+        """Noise up to the band's end, peaks at most `CREST` times RMS; over a speed its power grows with frequency."""
         rng = np.random.default_rng((self.seed, place))
         f = np.fft.rfftfreq(count, dt)
         inside = (f <= self.band) & (f >= 0.5 * self.lowest)
-        noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(count)) * np.sqrt(f) * inside, count)
+        shape = np.sqrt(f) * inside if self.about == "speed" else 1.0 * inside
+        noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(count)) * shape, count)
         for _ in range(20):
             noise /= float(np.sqrt(np.mean(noise**2)))
             noise = np.fft.irfft(np.fft.rfft(np.clip(noise, -0.9 * CREST, 0.9 * CREST)) * inside, count)
@@ -175,19 +212,24 @@ class Inertia(Procedure):
         )
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """The speed never fell below the least one; and what current that took."""
-        lowest = float(np.min(slopes(record, SLOW)))
+        """The speed never fell below the least one, or the axis left its rest; and what current that took."""
         excited = record["torque_setpoint"]
         parts = np.array_split(excited, len(self.current))
         applied = ", ".join(f"{float(np.std(p)) / self.torque_constant:.3g}" for p in parts)
         asked = ", ".join(f"{c:g}" for c in self.current)
+        current_check = Check("current", True, f"{applied} A RMS applied of {asked} asked for")
+        if self.about == "rest":
+            moved = float(np.ptp(record["position"]))
+            text = f"the axis moved within {moved:.3g} rad; if it did not, raise the current"
+            return Check("moved", moved > LEAST_MOTION, text), current_check
+        lowest = float(np.min(slopes(record, SLOW)))
         return (
             Check(
                 "reversal", lowest >= self.least,
                 f"the lowest speed over {1e3 * SLOW:g} ms was {lowest:.3g} rad/s, at least {self.least:g} is needed so "
                 "that friction keeps its sign; if it fails, raise speed or lower current",
             ),
-            Check("current", True, f"{applied} A RMS applied of {asked} asked for"),
+            current_check,
         )  # fmt: skip
 
 
