@@ -248,6 +248,18 @@ def test_the_error_of_lugre_above_stribeck_is_computed():
     assert "12 % above Stribeck's; near zero velocity it is smaller" in reason
 
 
+def test_sticking_away_from_reversals_is_judged_and_its_lack_is_explained():
+    """4.3.1.2.2 and 4.3.2.2.2 say three times that friction over position makes the axis stick at full speed."""
+    group, shares = "grease-high-PD10", {"coulomb": 0.117, "stribeck": 0.0, "lugre": 0.0, "gms": 0.0}
+    view = Numbers({(f"{group}/FF-{law}", "sticking_share"): x for law, x in shares.items()})
+    judged = judgement(view, ["as it is"], "grease-high-FF-nonzero")
+    assert judged.holds is False
+    assert "never stops with FF-stribeck, FF-lugre, FF-gms; part" in judged.reason
+    assert "FF-coulomb 12 %" in judged.reason
+    all_stick = Numbers({(f"{group}/FF-{law}", "sticking_share"): 0.01 for law in shares})
+    assert judgement(all_stick, ["as it is"], "grease-high-FF-nonzero").holds is True
+
+
 def test_every_reason_belongs_to_a_statement():
     assert {claim.id for claim in CLAIMS} >= set(WHY)
 
