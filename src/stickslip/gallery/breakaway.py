@@ -8,6 +8,8 @@ rates are those of Canudas de Wit et al. (1995): Fs = 1.5 N, Fc = 1 N, 1 kg.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
@@ -15,7 +17,7 @@ from stickslip.report.analysis_pictures import Drawn
 from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
 
-LEVELS = {"fs": 1.5, "fc": 1.0, "vs": 1e-3, "sigma2": 0.4}  # N, N, m/s, N·s/m
+LEVELS: dict[str, Any] = {"fs": 1.5, "fc": 1.0, "vs": 1e-3, "sigma2": 0.4}  # N, N, m/s, N·s/m
 LUGRE = Model("lugre", sigma0=1e5, sigma1=1e5**0.5, **LEVELS)
 GMS = Model("gms", k=[5e4, 3e4, 2e4], alpha=[1 / 3] * 3, c=100.0, **LEVELS)
 STYLES = {"LuGre": Style("#D55E00", (0, (4, 1.2)), 1.4, "s"), "GMS": Style("#0072B2", "-", 1.4, "o")}

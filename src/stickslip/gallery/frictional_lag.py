@@ -47,7 +47,7 @@ def width(record: Record) -> float:
 
 def picture() -> Drawn:
     """Draw the loops."""
-    panels = []
+    panels: list[Panel] = []
     for name, model in (("GMS", GMS), ("LuGre", LUGRE)):
         records = {f: swung(model, f) for f in FREQUENCIES}
         curves = [

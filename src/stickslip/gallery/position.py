@@ -46,7 +46,7 @@ def harmonic(record: Record, periods: int) -> float:
 
 def picture() -> Drawn:
     """Draw the size of the torque over the position, both ways."""
-    curves = []
+    curves: list[Curve] = []
     for name, speed, style in (("forward", SPEED, FORWARD), ("backward", -SPEED, BACKWARD)):
         record = turned(rippling("gms"), speed)
         order = np.argsort(record["position"])

@@ -8,6 +8,8 @@ force that pulses to one side, always below break-away, it drifts where GMS stan
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, law, respond, simulate
@@ -22,17 +24,25 @@ TURNS = [0.0, 25e-6, -25e-6, 11e-6, -11e-6, 25e-6]  # rad
 SPEED = 5e-6  # rad/s, mean
 
 
+def turning_times() -> list[float]:
+    """Return the times of the turning points, s."""
+    times = [0.0]
+    for start, end in itertools.pairwise(TURNS):
+        times.append(times[-1] + abs(end - start) / SPEED)
+    return times
+
+
 def loop(model: Model) -> Record:
     """Move a contact slowly from turning point to turning point."""
-    time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(TURNS))) / SPEED])
-    motion = Reference.table(time.tolist(), TURNS)
+    time = turning_times()
+    motion = Reference.table(time, TURNS)
     return respond(model, motion, np.linspace(0.0, time[-1], 3001), tolerance=1e-9)
 
 
 def gap(record: Record) -> float:
     """Torque where the interruption began less torque where its loop comes back there, N·m."""
-    third, last = np.cumsum(np.abs(np.diff(TURNS)))[[2, 3]] / SPEED
-    began = np.interp(third, record.time, record["friction_torque"])
+    *_, third, last, _ = turning_times()
+    began = float(np.interp(third, record.time, record["friction_torque"]))
     back = record.time > last
     return float(began - np.interp(TURNS[3], record["position"][back], record["friction_torque"][back]))
 

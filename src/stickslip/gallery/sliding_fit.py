@@ -22,7 +22,7 @@ from stickslip.report.styles import Style
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-TABLE_1 = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
+TABLE_1: dict[str, Any] = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}
 PLANT = Model("gms", k=[1e4, 7e3, 5e3, 3e3], alpha=[0.25] * 4, c=24.0, **TABLE_1)
 GUESS = Model("stribeck_plain", fs=0.5, fc=0.1, vs=0.05, delta_s=1.0, sigma2=0.005)
 VELOCITIES = np.array([0.001, 0.025, 0.03, 0.04, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0])  # rad/s, eq. 3.18
@@ -36,18 +36,13 @@ TRUE, OTHER = Style("#000000", (0, (4, 1.2)), 1.2), Style("#E69F00", "-", 0.8)
 
 def fitted(velocities: Array = VELOCITIES) -> Identification:
     """Fit eq. 2.6 to the plant's torque at constant velocities, rad/s."""
-    torques = np.array([PLANT.sliding_torque(v) for v in velocities])
-    return identify_sliding(SlidingPoints(velocities, torques), GUESS, noise=NOISE)
+    points = SlidingPoints(velocities, PLANT.sliding_torque(velocities))
+    return identify_sliding(points, GUESS, noise=NOISE)
 
 
 def without_bend() -> Identification:
     """Fit the points without the second one."""
     return fitted(FEWER)
-
-
-def curve_of(model: Model) -> Array:
-    """Torque of a model at constant velocity over `GRID`, N·m."""
-    return np.array([model.sliding_torque(v) for v in GRID])
 
 
 def equally_good(found: Identification) -> list[Model]:
@@ -65,7 +60,7 @@ def picture() -> Drawn:
     found = fitted()
     values = ", ".join(f"{name} {found[name].value:.4g}" for name in TABLE_1)
     assert found.model is not None
-    curve = Curve(GRID, curve_of(found.model), "fitted curve", FIT)
+    curve = Curve(GRID, found.model.sliding_torque(GRID), "fitted curve", FIT)
     return "Friction at constant velocity and the curve fitted to it", values, [_panel([curve])], 2.6
 
 
@@ -73,17 +68,16 @@ def picture_without_bend() -> Drawn:
     """Draw curves that fit eleven of the points equally well (thesis figure 3.8)."""
     found = without_bend()
     curves = [
-        Curve(GRID, curve_of(model), "" if i else "fit the points equally well", OTHER)
+        Curve(GRID, model.sliding_torque(GRID), "" if i else "fit the points equally well", OTHER)
         for i, model in enumerate(equally_good(found))
     ]
-    curves.append(Curve(GRID, curve_of(PLANT), "true curve", TRUE))
+    curves.append(Curve(GRID, PLANT.sliding_torque(GRID), "true curve", TRUE))
     message = f"Without the point at 25 mrad/s {', '.join(found.not_identified)} are not determined"
     return "Inaccurate curves through points that miss the bend", message, [_panel(curves, FEWER)], 2.6
 
 
 def _panel(curves: list[Curve], velocities: Array = VELOCITIES) -> Panel:
-    torques = np.array([PLANT.sliding_torque(v) for v in velocities])
-    points = Curve(velocities, torques, "plant at constant velocity", DATA, "points")
+    points = Curve(velocities, PLANT.sliding_torque(velocities), "plant at constant velocity", DATA, "points")
     return Panel(
         [*curves, points], "friction torque (N·m)", "velocity (rad/s)", (GRID[0], GRID[-1]), x_scale="log"
     )

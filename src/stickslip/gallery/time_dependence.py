@@ -7,6 +7,8 @@ loses a part of its friction so; parameters found in the first minute are wrong 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from stickslip import Model, Record, Reference, law, respond
@@ -14,6 +16,7 @@ from stickslip.report.analysis_pictures import Drawn
 from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
 
+Array = np.ndarray[Any, np.dtype[np.float64]]
 DRIFT, TIME = -0.3, 60.0  # of the torque in the long run; s
 PERIOD, PERIODS, SAMPLES = 10.0, 24, 2000  # s; and samples in each
 GREY, BLUE = Style("#777777", (0, (4, 1.2)), 1.2), Style("#0072B2", "-", 1.3)
@@ -25,7 +28,7 @@ def warming(name: str) -> Model:
     return Model(name, {"time_dependence": "settling"}, **law(name).example, drift=DRIFT, drift_time=TIME)
 
 
-def factor(time: np.ndarray) -> np.ndarray:
+def factor(time: Array) -> Array:
     """What is left of the friction, -."""
     return 1.0 + DRIFT * (1.0 - np.exp(-time / TIME))
 
