@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,8 @@ from typing import Any
 import pytest
 
 import stickslip
+from stickslip import gallery
+from stickslip.cli import parser_of
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -132,6 +135,59 @@ def test_the_list_for_language_models_names_pages_that_there_are() -> None:
     assert named
     for page in named:
         assert (DOCS / f"{page}.md").exists(), page
+
+
+THESIS = DOCS / "thesis.md"
+FIGURES = {1: 1, 2: 12, 3: 38, 4: 59, 7: 5}
+"""Figures in each chapter of the thesis; 7 is its appendix."""
+
+
+def numbers_in(text: str) -> set[str]:
+    """Numbers of figures and sections in a text, ranges such as 3.10 to 3.14 with all that they span."""
+    found = set(re.findall(r"(?<![\d.])\d\.\d+(?:\.\d+)*", text))
+    for chapter, first, last in re.findall(r"(\d)\.(\d+) to \1\.(\d+)", text):
+        found |= {f"{chapter}.{n}" for n in range(int(first), int(last) + 1)}
+    return found
+
+
+def test_the_page_of_the_thesis_has_every_figure_table_and_section() -> None:
+    text = THESIS.read_text(encoding="utf-8")
+    prose = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    found = numbers_in(prose)
+    assert {f"{c}.{n}" for c, count in FIGURES.items() for n in range(1, count + 1)} - found == set()
+    assert {"1.2", "2.1.8", "2.2.4", "2.3.4", "3.2.4", "4.3.2.2.3", "4.4", "4.5", "5.1", "5.2"} <= found
+    spans = re.findall(r"Tables? (\d+)(?:(?:,| and| to) (\d+))?", " ".join(prose.split()))
+    tables = {n for first, last in spans for n in range(int(first), int(last or first) + 1)}
+    assert tables == set(range(1, 11))
+
+
+def test_every_command_on_the_page_of_the_thesis_is_one() -> None:
+    """Those in its tables are not run when it is built."""
+    text = THESIS.read_text(encoding="utf-8")
+    commands = [c for c in re.findall(r"`(stickslip [a-z][^`]*)`", text) if not re.search(r"[A-Z]{4}", c)]
+    commands += [
+        c for body in re.findall(r"```(?:ba)?sh\n(.*?)```", text, re.DOTALL) for c in body.splitlines()
+    ]
+    assert len(commands) > 50
+    for command in commands:
+        words = shlex.split(command)[1:]
+        parser_of([words[0]]).parse_args(words)
+        if words[0] == "figure":
+            assert words[1] in gallery.FIGURES
+
+
+@pytest.mark.slow
+@pytest.mark.long  # minutes: what the page shows without running it
+def test_the_long_commands_on_the_page_of_the_thesis_run(tmp_path: Path) -> None:
+    text = THESIS.read_text(encoding="utf-8")
+    commands = [c for body in re.findall(r"```bash\n(.*?)```", text, re.DOTALL) for c in body.splitlines()]
+    assert len(commands) == 3
+    for command in commands:
+        words = [sys.executable, "-m", *shlex.split(command)]
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+    assert {"chapter3", "commissioned", "chapter4"} <= {p.name for p in tmp_path.iterdir()}
+    assert "52 hold under both rules" in (tmp_path / "chapter3" / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_page_that_shows_what_is_not_printed_is_refused(tmp_path: Path) -> None:

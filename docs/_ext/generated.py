@@ -30,7 +30,7 @@ from sphinx.util import logging
 
 log = logging.getLogger(__name__)
 
-RUN = ("tutorial.md", "from_a_log.md", "howto/*.md", "explanation/*.md")
+RUN = ("tutorial.md", "from_a_log.md", "thesis.md", "howto/*.md", "explanation/*.md")
 """Pages that are executed (`sessions`)."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,6 +18,7 @@ from stickslip.analyse.flexibility import (
 )
 from stickslip.errors import ParameterError
 from stickslip.machines.drivetrain import Chain
+from stickslip.report.analysis_pictures import picture_of_flexibility
 
 TOTAL, SPRINGS = 4.2757e-4, (17800.0, 396.0)
 sizes = st.floats(1e-3, 1.0)
@@ -105,3 +107,16 @@ def test_printed_270_and_2750_agree_as_frequencies_of_parts():
 def test_bad_input(springs, whole, more):
     with pytest.raises(ParameterError):
         flexibility(springs, whole, **more)
+
+
+def test_the_picture_shows_the_modes_of_the_given_inertias():
+    """Figure 4.57: those of the thesis's machine are 0, 308 and 2749 Hz; the thesis prints 0, 270 and 2750."""
+    parts = (1.2e-4, 1.2e-4, 1.8757e-4)
+    *_, panels, _ = picture_of_flexibility(flexibility(SPRINGS, TOTAL, inertias=parts))
+    point = next(c for c in panels[0].curves if c.label.startswith("these inertias"))
+    assert point.y == pytest.approx([307.8], abs=0.1)
+    assert point.x == pytest.approx([100.0 * parts[-1] / TOTAL])
+    shapes = {c.label: c.x for c in panels[1].curves}
+    assert list(shapes) == ["mode at 0 Hz", "mode at 308 Hz", "mode at 2749 Hz"]
+    assert sum(np.diff(np.sign(shapes["mode at 2749 Hz"])) != 0) == 2
+    assert len(picture_of_flexibility(flexibility(SPRINGS, TOTAL))[2]) == 1

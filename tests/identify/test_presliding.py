@@ -51,6 +51,15 @@ def test_table_5_stiffness_within_2_percent(loop: Loop) -> None:
     assert result.misfit["held_out_relative"] < 0.02
 
 
+def test_the_whole_record_is_drawn_from_rest(loop: Loop) -> None:
+    """Figures 4.12 and 4.36: all cycles with their transient, where figures 4.11 and 4.35 show one."""
+    result = identify_presliding(loop, CURVE, elements=4, noise=1e-4)
+    pictures = {p.name: p for p in result.pictures}
+    measured, model = pictures["hysteresis-whole"].traces
+    assert measured.x.size == loop.time.size > pictures["hysteresis"].traces[0].x.size
+    assert model.y == pytest.approx(loop.torque, abs=2e-3)
+
+
 @needs_reference("identification.json")
 def test_table_5_by_command(loop: Loop, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = (

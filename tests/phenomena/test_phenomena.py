@@ -1,37 +1,65 @@
-"""The phenomena of thesis 2.1 as properties, and the scripts that draw them."""
+"""The phenomena of thesis 2.1 as properties, the fits of 3.1.3.1, and the command that draws them."""
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 
-from stickslip import Model, law, law_names
-
-FOLDER = Path(__file__).parents[2] / "examples" / "phenomena"
-SCRIPTS = sorted(p.stem for p in FOLDER.glob("[a-z]*.py"))
+from stickslip import Model, gallery, law, law_names
+from stickslip.cli import main
+from stickslip.gallery import FIGURES
 
 
 def script(name: str) -> ModuleType:
-    """A script as a module."""
-    spec = importlib.util.spec_from_file_location(f"phenomenon_{name}", FOLDER / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    """A module of the gallery."""
+    return importlib.import_module(f"stickslip.gallery.{name}")
 
 
-@pytest.mark.slow
-@pytest.mark.long  # CI runs the scripts where it builds the documentation
-@pytest.mark.parametrize("name", SCRIPTS)
-def test_every_script_draws(name: str, tmp_path: Path) -> None:
-    script(name).main(tmp_path / name)
-    assert (tmp_path / f"{name}.png").stat().st_size > 10_000
-    assert (tmp_path / f"{name}.svg").exists()
+def test_the_command_lists_every_figure_and_its_modules_are_all_listed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["figure"]) == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in listed] == list(FIGURES)
+    modules = {p.stem for p in Path(gallery.__file__).parent.glob("[a-z]*.py")}
+    assert {figure.module for figure in FIGURES.values()} == modules
+
+
+def test_a_figure_that_is_not_there_is_refused_with_those_that_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["figure", "2.9"]) == 2
+    assert "2.1, 2.2, 2.3" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "number",
+    ["3.7", *(pytest.param(n, marks=[pytest.mark.slow, pytest.mark.long]) for n in FIGURES if n != "3.7")],
+)
+def test_the_command_draws_a_figure(number: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "figure.png"
+    assert main(["figure", number, "--plot", str(target)]) == 0
+    assert f"picture: {target}" in capsys.readouterr().out
+    assert target.stat().st_size > 10_000
+
+
+# ---- fits of the sliding curve (3.1.3.1) ----------------------------------------------------------------------
+
+
+def test_twelve_points_give_table_1_and_eleven_leave_three_parameters_open() -> None:
+    """Figures 3.7 and 3.8: without 25 mrad/s curves differ below it by more than the bend itself is deep."""
+    example = script("sliding_fit")
+    found = example.fitted()
+    assert {n: found[n].value for n in example.TABLE_1} == pytest.approx(example.TABLE_1, rel=1e-6)
+    missing = example.without_bend()
+    assert set(missing.not_identified) == {"fs", "vs", "delta_s"}
+    curves = np.array([[m.sliding_torque(v) for v in (0.01, 0.1)] for m in example.equally_good(missing)])
+    assert np.ptp(curves[:, 0]) > 0.04
+    assert np.ptp(curves[:, 1]) < 1e-5
 
 
 # ---- break-away (2.1.1) ---------------------------------------------------------------------------------------

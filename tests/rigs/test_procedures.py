@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -81,6 +82,28 @@ def test_the_response_shows_the_modes_of_the_machine_and_no_others():
     result = run("inertia", virtual_rig("thesis-dry"), band="400", current="1.6")
     records = [experiment_of(result.part(label), ServoAxis()) for label, *_ in result.segments]
     assert inertia(records, ServoAxis()).details["resonances"] == pytest.approx([85.0, 308.0], rel=0.02)
+
+
+def test_two_currents_about_rest_differ_at_low_frequencies_and_over_a_speed_they_do_not(tmp_path, capsys):
+    """Figure 4.4: friction separates the responses where they are slow, inertia brings them together."""
+    found = {}
+    for about, options in {"rest": {"band": "100", "current": "1.6,2.2"}, "speed": {}}.items():
+        path = run("inertia", virtual_rig("thesis-dry"), about=about, **options).record.save(
+            tmp_path / "r.npz"
+        )
+        command = ["identify", str(path), "--method", "inertia", "--json", "--out", str(tmp_path / about)]
+        assert main(command) == 0
+        found[about] = {e["name"]: e["value"] for e in json.loads(capsys.readouterr().out)["estimates"]}
+    assert found["rest"]["viscous[0]"] > 1.5 * found["rest"]["viscous[1]"]
+    assert found["speed"]["viscous[0]"] == pytest.approx(found["speed"]["viscous[1]"], rel=0.05)
+    report = (tmp_path / "rest" / "report.html").read_text(encoding="utf-8")
+    slow, fast = map(float, re.search(r"differ by ([\d.]+)\s+dB.*? by ([\d.]+)\s+dB", report).groups())
+    assert slow > 5.0 > 4.0 > fast
+
+
+def test_an_excitation_about_what_no_axis_has_is_refused():
+    with pytest.raises(InputError, match="speed or rest"):
+        procedure("inertia").with_options({"about": "midair"})
 
 
 def test_inertia_refuses_a_run_that_slows_down_too_far():

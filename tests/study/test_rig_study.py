@@ -11,6 +11,8 @@ import pytest
 from stickslip.cli import main
 from stickslip.errors import ConfigError, Interrupted
 from stickslip.machines.files import machine
+from stickslip.record import Record
+from stickslip.report import rig_report
 from stickslip.study import study as studies
 from stickslip.study.experiments import NOMINAL, ExperimentRun, ExperimentView, experiments_of, variant
 from stickslip.study.plan import load, select
@@ -38,6 +40,7 @@ def test_every_experiment_of_chapter_4_is_there(chapter_4):
         assert {"FB-gms10", e.linear, *e.beside} < names
     figures = {f for e in experiments for f in e.figures}
     assert {"4.15", "4.16", "4.39", "4.51", "7.2", "7.3", "7.4", "7.5"} <= figures
+    assert [f for e in experiments for f in e.enlarged] == ["4.20", "4.22", "4.46"]
     low = next(r for r in runs if r.key == "own/low/dry/PD36-FB-gms10")
     assert low.control.gains.kp == pytest.approx(19.7612, rel=1e-4)  # Table 6
     assert low.control.compensator.filter_hz == 10.0
@@ -245,6 +248,18 @@ def test_the_error_of_lugre_above_stribeck_is_computed():
     assert "12 % above Stribeck's; near zero velocity it is smaller" in reason
 
 
+def test_sticking_away_from_reversals_is_judged_and_its_lack_is_explained():
+    """4.3.1.2.2 and 4.3.2.2.2 say three times that friction over position makes the axis stick at full speed."""
+    group, shares = "grease-high-PD10", {"coulomb": 0.117, "stribeck": 0.0, "lugre": 0.0, "gms": 0.0}
+    view = Numbers({(f"{group}/FF-{law}", "sticking_share"): x for law, x in shares.items()})
+    judged = judgement(view, ["as it is"], "grease-high-FF-nonzero")
+    assert judged.holds is False
+    assert "never stops with FF-stribeck, FF-lugre, FF-gms; part" in judged.reason
+    assert "FF-coulomb 12 %" in judged.reason
+    all_stick = Numbers({(f"{group}/FF-{law}", "sticking_share"): 0.01 for law in shares})
+    assert judgement(all_stick, ["as it is"], "grease-high-FF-nonzero").holds is True
+
+
 def test_every_reason_belongs_to_a_statement():
     assert {claim.id for claim in CLAIMS} >= set(WHY)
 
@@ -286,3 +301,46 @@ def test_its_file_is_printed(capsys):
 def test_seeds_are_for_experiments(capsys):
     assert main(["study", "thesis", "--seeds", "3"]) == 2
     assert "thesis.toml has no [experiments.NAME]; leave out seeds" in capsys.readouterr().err
+
+
+# ---- pictures ---------------------------------------------------------------------------------------------------
+
+
+class Ran:
+    """A run whose record is given."""
+
+    def __init__(self, error: float) -> None:
+        time = np.linspace(0.0, 1.0, 101)
+        goal = 0.01 * time
+        channels = {"position_reference": goal, "position": goal + error * np.sin(np.pi * time)}
+        self.made = Record(time, channels, dict.fromkeys(channels, "rad"))
+
+    def record(self) -> Record:
+        return self.made
+
+
+def test_a_response_stays_in_its_picture_and_one_far_away_is_named():
+    """Figures 4.15 and 4.16: feedforward of 36 Hz overshoots by as much as the reference travels."""
+    panel = rig_report._panel(
+        {"PD": Ran(0.001), "FF-lugre": Ran(0.019), "FB-gms": Ran(0.2)}, (0.0, 1.0), "all"
+    )
+    low, high = panel.y_limits
+    shown = {c.label: c.y for c in panel.curves if c.y.size}
+    assert low < 0.0
+    assert shown["lugre"].max() < high < shown["gms"].max()
+    assert "off scale: gms by 200 mrad" in panel.note
+    assert "lugre" not in panel.note
+
+
+@pytest.mark.slow
+def test_reversals_of_the_fast_sine_are_enlarged(tmp_path, chapter_4):
+    """Figures 4.20, 4.22 and 4.46: where 1 rad hides it, PID alone lags and LuGre feedforward does not."""
+    result = studies.run(chapter_4, tmp_path, ["grease-high-PID10"])
+    figures = {f["id"]: f for f in rig_report.draw_experiments(result, tmp_path / "figures")}
+    enlarged = figures["grease-high-PID10-enlarged"]
+    assert "thesis figure 4.46" in enlarged["title"]
+    assert (tmp_path / "figures" / "grease-high-PID10-enlarged.png").exists()
+    window = rig_report.REVERSALS["high"]
+    runs = {run.controller.partition("-")[2]: run for run in result.runs}
+    errors = {name: rig_report._error_within(runs[name], window) for name in ("PID", "FF-lugre")}
+    assert errors["FF-lugre"] < 0.5 * errors["PID"]

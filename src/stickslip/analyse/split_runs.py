@@ -1,4 +1,4 @@
-"""Split a procedure's record into runs: one per velocity and direction, or one per repetition."""
+"""Split a procedure's record into runs: one per velocity and direction, per repetition, or per current."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ def pieces(name: str, record: Record) -> list[tuple[str, Record]]:
     name : str
         Of the record.
     record : Record
-        Of ``sliding`` (one run per velocity and direction) or ``repeat`` (one per repetition).
+        Of ``sliding`` (one run per velocity and direction), ``repeat`` (one per repetition) or ``inertia`` (one per
+        current).
     """
     constants: Any = record.meta.get("reading", {}).get("constants", {})
     kind = record.meta.get("procedure", constants.get("procedure"))
-    if kind == "repeat":
+    if kind in ("repeat", "inertia"):
         steps = np.diff(record.time)
         runs = np.split(np.arange(len(record)), np.flatnonzero(steps > GAP * np.median(steps)) + 1)
         return [(f"{name} {i + 1}", rows_of(record, rows)) for i, rows in enumerate(runs)]

@@ -37,7 +37,7 @@ from stickslip.verbs.kinds import require
 
 VERBS = (
     "study", "sweep", "tune", "simulate", "learn", "identify", "doctor", "analyse", "compare", "recommend", "demo",
-    "rig", "machine", "laws", "law", "cite", "rerun", "export", "web", "warm-up", "version"
+    "rig", "machine", "laws", "law", "figure", "cite", "rerun", "export", "web", "warm-up", "version"
 )  # fmt: skip
 
 

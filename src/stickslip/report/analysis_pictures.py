@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from stickslip.analyse.motor_vs_sensor import Sides
 from stickslip.analyse.repeatability import Repeated
 from stickslip.analyse.spectrum import Spectrum
 from stickslip.identify.presliding.attraction import OvershootRule
-from stickslip.machines.drivetrain import Chain
+from stickslip.machines.drivetrain import Chain, Modes
 from stickslip.report.plots import Curve, Panel, envelope, save, scaled
 from stickslip.report.styles import Style
 
@@ -34,6 +35,7 @@ DASHED = (
     Style("#7f7f7f", (0, (3, 1, 1, 1, 1, 1))),
 )  # fmt: skip
 LINES = (MAIN, OTHER, *DASHED[1:])
+POINT = Style("#009E73", "", 1.6)
 SHOWN = 50.0
 """Duration of a response to a sudden velocity, ms."""
 SHARES = np.linspace(0.02, 0.98, 97)
@@ -185,7 +187,10 @@ def picture_of_overshoot(found: OvershootRule) -> Drawn:
 
 
 def picture_of_flexibility(found: Flexibility) -> Drawn:
-    """Return the first mode over the share of the last inertia: with no division of the rest it is below the bound."""
+    """Return the first mode over the share of the last inertia, and the modes of given inertias (thesis figure 4.57).
+
+    With no division of the rest is a first mode below the bound.
+    """
     curves: list[Curve] = []
     if len(found.stiffness) == 2:
         for i, (label, part) in enumerate(SPLITS.items()):
@@ -212,13 +217,33 @@ def picture_of_flexibility(found: Flexibility) -> Drawn:
         )
         for f in found.claimed[:1]
     ]
+    if found.chain and found.modes:
+        share = 100.0 * found.chain.inertias[-1] / found.chain.total
+        label = f"these inertias, {found.modes.frequencies[1]:.0f} Hz"
+        curves.append(Curve(np.array([share]), found.modes.frequencies[1:2], label, POINT, "points"))
     top = 2.5 * found.floor
     impossible = [f for i, f in enumerate(found.claimed, 1) if f < found.lowest(i)]
     what = " and ".join(f"{f:g} Hz" for f in impossible)
     message = f"no division of {found.inertia:.4g} kg·m² puts the first mode below {found.floor:.0f} Hz" + (
         f"; {what}: impossible" if impossible else ""
     )
-    panel = Panel(
-        curves, "first mode (Hz)", "share of the last inertia in the whole (%)", (0.0, 100.0), (0.6 * found.floor, top)
-    )  # fmt: skip
-    return "Possible first modes of the drivetrain", message, (panel,), 2.6
+    panels = [
+        Panel(
+            curves, "first mode (Hz)", "share of the last inertia in the whole (%)", (0.0, 100.0),
+            (0.6 * found.floor, top),
+        )
+    ]  # fmt: skip
+    if found.chain and found.modes:
+        panels.append(_shapes(found.chain, found.modes))
+    return "Possible first modes of the drivetrain", message, panels, 2.6
+
+
+def _shapes(chain: Chain, modes: Modes) -> Panel:
+    """Draw the angle of every inertia in every mode, the largest 1."""
+    row = np.arange(float(len(chain.inertias)))
+    curves = [
+        Curve(modes.shapes[:, i], row, f"mode at {f:.0f} Hz", replace(LINES[i % len(LINES)], marker="o"))
+        for i, f in enumerate(modes.frequencies)
+    ]
+    names = [f"$J_{{{i}}}$ = {x:.3g} kg·m²" for i, x in enumerate(chain.inertias, 1)]
+    return Panel(curves, "", "angle in a mode, the largest 1", (-1.15, 1.15), y_names=names)

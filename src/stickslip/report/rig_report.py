@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import unwritable
+from stickslip.record import Record
 from stickslip.report.conclusions import rig_conclusion
 from stickslip.report.html import image
 from stickslip.report.page import filled
@@ -24,6 +25,10 @@ from stickslip.whole_files import write_whole
 MARKS = {True: ("yes", "holds"), False: ("no", "does not hold"), None: ("open", "not run")}
 WINDOWS = {"low": (2.5, 5.0), "high": (0.0, 20.0), "step": (0.0, 1.5)}
 """s, of each reference that is drawn."""
+REVERSALS = {"high": (14.8, 15.8)}
+"""s, about the second reversal of a reference whose whole travel hides what happens there."""
+MARGIN = 2.0
+"""Of the reference's travel, up to which an error is drawn to scale."""
 ABLATED = (
     ("dry-low-PD36/PD", "position_above_5Hz_rms_rad", "PD 36 Hz, dry, slow: oscillation"),
     ("dry-low-PD36/FF-lugre", "position_rms_rad", "FF LuGre, dry, slow: error"),
@@ -39,9 +44,13 @@ def draw_experiments(result: StudyResult, folder: Path) -> list[dict[str, Any]]:
     """Draw every experiment's responses; returns what the report needs of each."""
     view = ExperimentView(result)
     return [
-        _drawn(one, runs, folder / one.name)
+        drawn
         for one in experiments_of(result.config)
         if (runs := view.nominal(one))
+        for drawn in (
+            _drawn(one, runs, folder / one.name),
+            *_enlarged(one, runs, folder / f"{one.name}-enlarged"),
+        )
     ]
 
 
@@ -51,18 +60,64 @@ def _drawn(one: Experiment, runs: Mapping[str, Run], stem: Path) -> dict[str, An
     for name in runs:
         if name not in linear:
             groups[name[:2] if name[:2] in KINDS else ""].append(name)
+    window = WINDOWS.get(one.reference, (0.0, math.inf))
     panels = [
-        _panel(one, {n: runs[n] for n in (*linear, *names)}, KINDS[kind])
+        _panel({n: runs[n] for n in (*linear, *names)}, window, KINDS[kind])
         for kind, names in groups.items()
         if names
     ]
     best = min(runs, key=lambda name: runs[name].metrics["position_rms_rad"])
     rms = 1e3 * runs[best].metrics["position_rms_rad"]
-    title = f"Machine {one.machine}, reference {one.reference}, {one.linear} of {one.bandwidth:g} Hz"
-    title += f" (thesis figures {' and '.join(one.figures)})" if one.figures else ""
-    message = f"Least RMS error: {worded(best)}, {rms:.3g} mrad"
+    return _saved(stem, titled(one, one.figures), f"Least RMS error: {worded(best)}, {rms:.3g} mrad", panels)
+
+
+def _enlarged(one: Experiment, runs: Mapping[str, Run], stem: Path) -> Iterator[dict[str, Any]]:
+    """Draw a reversal of a fast reference: feedforward, LuGre feedback and its velocity (figures 4.20, 4.22, 4.46).
+
+    Feedback by the other laws oscillates beyond the scale.
+    """
+    window = REVERSALS.get(one.reference)
+    runs = {name: run for name, run in runs.items() if not run.failure}
+    linear = [n for n in runs if n == one.linear]
+    feedforward, feedback = ([n for n in runs if n.startswith(start)] for start in ("FF-", "FB-lugre"))
+    if window is None or not linear or not (feedforward or feedback):
+        return
+    panels: list[Panel] = []
+    for names, kind in ((feedforward, "feedforward"), (feedback, "feedback of LuGre")):
+        if names:
+            panels.append(_panel({n: runs[n] for n in (*linear, *names)}, window, kind))
+    if feedback:
+        shown = {n: runs[n] for n in (*linear, *feedback)}
+        panels.append(_panel(shown, window, "feedback of LuGre", "velocity"))
+    errors = {n: _error_within(runs[n], window) for n in (*linear, *feedforward, *feedback)}
+    best = min(errors, key=errors.__getitem__)
+    message = f"Least RMS error from {window[0]:g} to {window[1]:g} s: {worded(best)}, {1e3 * errors[best]:.3g} mrad"
+    title = titled(one, one.enlarged)
+    yield _saved(stem, f"Reversal enlarged: {title[0].lower()}{title[1:]}", message, panels)
+
+
+def _saved(stem: Path, title: str, message: str, panels: Sequence[Panel]) -> dict[str, Any]:
     draw(stem, title, message, panels, 2.1)
-    return {"id": one.name, "title": title, "caption": message, **image(stem)}
+    return {"id": stem.name, "title": title, "caption": message, **image(stem)}
+
+
+def titled(one: Experiment, figures: Sequence[str]) -> str:
+    """Name an experiment: machine, reference and controller, and the thesis's figures."""
+    title = f"Machine {one.machine}, reference {one.reference}, {one.linear} of {one.bandwidth:g} Hz"
+    word = "figures" if len(figures) > 1 else "figure"
+    return title + (f" (thesis {word} {' and '.join(figures)})" if figures else "")
+
+
+def _error_within(run: Run, window: tuple[float, float]) -> float:
+    """RMS position error of a run in a window of time, rad."""
+    record = run.record()
+    inside = _inside(record, window)
+    return float(np.sqrt(np.mean((record["position_reference"] - record["position"])[inside] ** 2)))
+
+
+def _inside(record: Record, window: tuple[float, float]) -> Any:
+    time = record.time - record.time[0]
+    return (time >= window[0]) & (time <= window[1])
 
 
 KINDS = {"FF": "feedforward", "FB": "feedback", "": "others"}
@@ -80,31 +135,42 @@ def worded(name: str) -> str:
     return f"{labelled(name)} {kind}".strip()
 
 
-def _panel(one: Experiment, runs: Mapping[str, Run], note: str) -> Panel:
-    start, end = WINDOWS.get(one.reference, (0.0, math.inf))
-    curves: list[Curve] = []
-    reference: Curve | None = None
-    goal = np.zeros(1)
-    for name, run in runs.items():
-        record = run.record()
-        time = record.time - record.time[0]
-        goal, end = 1e3 * record["position_reference"], min(end, float(time[-1]))
-        inside = (time >= start) & (time <= end)
-        if not np.any(inside):
-            continue
-        if name == list(runs)[-1]:  # over the others, but named first
-            curves.insert(0, Curve(time[:0], time[:0], "reference", REFERENCE))
-            reference = Curve(*envelope(time[inside], goal[inside]), "", REFERENCE)
-        path = 1e3 * record["position"][inside]
-        # One legend serves both panels: a law looks the same in feedforward and feedback.
-        style = style_of(name.removeprefix("FF-").removeprefix("FB-"))
-        curves.append(Curve(*envelope(time[inside], path, 260), labelled(name), style))
-    curves += [reference] if reference else []
-    ends = (float(np.min(goal)), float(np.max(goal)))
-    margin = 0.45 * (ends[1] - ends[0])
+def _panel(
+    runs: Mapping[str, Run], window: tuple[float, float], note: str, channel: str = "position"
+) -> Panel:
+    """Position or velocity of runs and their reference in a window of time; what leaves the scale is named."""
+    lines = {name: _line(run.record(), window, channel) for name, run in runs.items()}
+    time, goal, _ = max(lines.values(), key=lambda line: line[0].size)
+    unit = "mrad" if channel == "position" else "mrad/s"
+    if not time.size:
+        return Panel((), f"{channel} ({unit})", "time (s)", None, None, f"{note}; every run ended before")
+    curves = [Curve(time[:0], time[:0], "reference", REFERENCE)]
+    # One legend serves all panels: a law looks the same in feedforward and feedback.
+    curves += [
+        Curve(*envelope(x, y, 260), labelled(n), style_of(n.removeprefix("FF-").removeprefix("FB-")))
+        for n, (x, _, y) in lines.items()
+        if x.size
+    ]
+    curves.append(Curve(*envelope(time, goal), "", REFERENCE))  # over the others, but named first
+    largest = {n: float(np.max(np.abs(y - g), initial=0.0)) for n, (_, g, y) in lines.items()}
+    room = MARGIN * float(np.ptp(goal))
+    seen = [goal, *(y for n, (_, _, y) in lines.items() if y.size and largest[n] <= room)]
+    low, high = min(float(y.min()) for y in seen), max(float(y.max()) for y in seen)
+    least = 0.08 * (high - low)
+    away = [f"{labelled(n)} by {x:.0f}" for n, x in largest.items() if x > room]
+    if away:
+        note += f"; off scale: {', '.join(away)} {unit}"
     return Panel(
-        curves, "position (mrad)", "time (s)", (start, end), (ends[0] - margin, ends[1] + margin), note
-    )
+        curves, f"{channel} ({unit})", "time (s)", (window[0], min(window[1], float(time[-1]))),
+        (low - least, high + least), note,
+    )  # fmt: skip
+
+
+def _line(record: Record, window: tuple[float, float], channel: str) -> tuple[Any, Any, Any]:
+    """Time, reference and channel in a window, s and thousandths."""
+    inside = _inside(record, window)
+    time = (record.time - record.time[0])[inside]
+    return time, 1e3 * record[f"{channel}_reference"][inside], 1e3 * record[channel][inside]
 
 
 def verdict_table(judged: Sequence[Judged]) -> list[dict[str, Any]]:

@@ -51,7 +51,8 @@ class Experiment:
         Of its poles, Hz and -.
     beside : tuple of str
         Linear controllers of the same poles that run beside it.
-    figures : tuple of str
+    figures, enlarged : tuple of str
+        Numbers of its figures, and of those that enlarge a reversal.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Experiment:
     damping: float
     beside: tuple[str, ...] = ()
     figures: tuple[str, ...] = ()
+    enlarged: tuple[str, ...] = ()
 
     @property
     def poles(self) -> Placement:
@@ -79,7 +81,7 @@ def experiments_of(config: Mapping[str, Any]) -> list[Experiment]:
     return [
         Experiment(
             name, t["machine"], t["reference"], t["linear"], t["bandwidth_hz"], t["damping"],
-            tuple(t.get("beside", ())), tuple(t.get("figures", ())),
+            tuple(t.get("beside", ())), tuple(t.get("figures", ())), tuple(t.get("enlarged", ())),
         )
         for name, t in config.get("experiments", {}).items()
     ]  # fmt: skip
@@ -219,6 +221,7 @@ def _experiment(name: str, table: Table, plants: Mapping[str, Any], motions: Map
             table.choice("linear", LINEAR), table.positive("bandwidth_hz", "Hz"), table.positive("damping", ""),
             tuple(table.texts("beside", LINEAR)) if table.has("beside") else (),
             tuple(table.values["figures"]) if table.has("figures") else (),
+            tuple(table.values["enlarged"]) if table.has("enlarged") else (),
         )  # fmt: skip
 
 

@@ -20,6 +20,9 @@ MAIN: dict[str, tuple[str, ...]] = {
     ),
     "GMS feedback is unstable": ("dry-low-FB-gms", "grease-low-FB-gms"),
     "and calmed by the 10 Hz filter": ("dry-low-FB-gms10", "grease-low-FB-gms10"),
+    "stick-slip at non-zero velocity as well": (
+        "dry-high-FF-nonzero", "dry-high-FB-nonzero", "dry-high-PID-nonzero", "grease-high-FF-nonzero",
+    ),
     "LuGre feedforward is best with grease": ("grease-low-lugre", "grease-high-lugre", "grease-low-PID10-lugre"),
 }  # fmt: skip
 """The main statements, by what they say together."""

@@ -94,6 +94,8 @@ def _high() -> list[Claim]:
               beats("near", cases(HIGH, "FF", DYNAMIC), cases(HIGH, "FF", STATIC))),
         claim("lugre", ("4.43",), "FF: LuGre is the best (5.1)",
               beats("rms", [f"{HIGH}/FF-lugre"], cases(HIGH, "FF", "coulomb stribeck gms"))),
+        claim("FF-nonzero", ("4.43",), "FF: stick-slip also at non-zero velocity, with every law",
+              above("sticking", cases(HIGH, "FF"), 0.0)),
         claim("FB-oscillates", ("4.44",), "FB: all responses oscillate", oscillates(HIGH, cases(HIGH, "FB", OTHERS))),
         claim("FB-gms", ("4.44",), "FB: GMS makes the system unstable", unstable(HIGH)),
         claim("FB-gms10", ("4.44",), "FB: GMS with filter gives the least oscillation",

@@ -161,6 +161,21 @@ def least_oscillation(group: str, expected: str) -> Reason:
     return reason
 
 
+def not_stuck(group: str) -> Reason:
+    """Which laws in feedforward never stop the axis away from the reversals, and for how long the others do."""
+
+    def reason(evidence: Evidence) -> str:
+        shares = {c: 100.0 * evidence("sticking", c) for c in cases(group, "FF")}
+        never = [_short(c) for c, share in shares.items() if share == 0.0]
+        if not never:
+            return ""
+        others = ", ".join(f"{_short(c)} {share:.2g} %" for c, share in shares.items() if share)
+        found = f"Away from the reversals the axis never stops with {', '.join(never)}"
+        return f"{found}; part of the time stuck with the others: {others}." if others else f"{found}."
+
+    return reason
+
+
 def steady_errors(group: str, laws: str) -> Reason:
     """Which laws reduce the steady-state error of the linear controller alone, and which do not."""
     alone = f"{group}/PID"
@@ -206,6 +221,8 @@ WHY: dict[str, Reason] = {
     "grease-low-FB-gms10": filter_lags(GREASE_LOW),
     "grease-high-FB-gms10": filter_lags(GREASE_HIGH),
     "dry-high-dynamic": dynamic_ahead(HIGH),
+    "dry-high-FF-nonzero": not_stuck(HIGH),
+    "grease-high-FF-nonzero": not_stuck(GREASE_HIGH),
     "dry-high-FB-smoother": slow_cycle(f"{HIGH}/FB-lugre"),
     "dry-high-PID10-FB-lugre": slow_cycle(f"{HIGH_PID}/FB-lugre"),
     "dry-step-PID10-FB-lugre": slow_cycle(f"{STEP_PID}/FB-lugre", "late shake"),

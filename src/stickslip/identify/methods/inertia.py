@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from stickslip.analyse.split_runs import pieces
 from stickslip.identify.estimate import Identification
 from stickslip.identify.methods._experiments import driven, experiments_of
 from stickslip.identify.methods.method import AXIS, Method, Options
@@ -12,8 +13,9 @@ from stickslip.record import Record
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """The inertia."""
-    axis, experiments = experiments_of(records, options)
+    """Return the inertia; a procedure's record of several currents is taken apart into one response each."""
+    parts = [part for record in records for _, part in pieces("", record)]
+    axis, experiments = experiments_of(parts, options)
     return inertia(experiments, axis)
 
 

@@ -342,18 +342,32 @@ def templates_for(loop: Loop, rows: Rows) -> dict[str, Model]:
 
 
 def loop_picture(loop: Loop, curve: Array, rows: Rows, rest: Rows, template: Model) -> Picture:
-    """Torque over displacement: measured, and the law's (thesis figures 4.11, 4.35)."""
-    shown = rest if rest.size else rows
+    """Return torque over displacement on the rows held out, or fitted (thesis figures 4.11, 4.35)."""
     words = f"error {100.0 * relative_error(loop, curve, rows):.2g} % on the rows fitted"
     if rest.size:
         words += f", {100.0 * relative_error(loop, curve, rest):.2g} % on the rows held out (drawn)"
+    title = f"Hysteresis: {template.law.title}"
+    return _loop_drawn("hysteresis", title, words, loop, curve, rest if rest.size else rows, template)
+
+
+def whole_picture(loop: Loop, curve: Array, template: Model) -> Picture:
+    """Return torque over displacement of the whole record, its transient included (thesis figures 4.12, 4.36)."""
+    rows = np.arange(loop.time.size)
+    words = f"error {100.0 * relative_error(loop, curve, rows):.2g} % from the start, where every element is unloaded"
+    title = f"Hysteresis from rest: {template.law.title}"
+    return _loop_drawn("hysteresis-whole", title, words, loop, curve, rows, template)
+
+
+def _loop_drawn(
+    name: str, title: str, words: str, loop: Loop, curve: Array, rows: Rows, template: Model
+) -> Picture:
     origin = float(np.mean(loop.position))
     traces = (
-        Trace("measured", loop.position[shown] - origin, loop.torque[shown]),
-        Trace(template.law.title, loop.position[shown] - origin, curve[shown]),
+        Trace("measured", loop.position[rows] - origin, loop.torque[rows]),
+        Trace(template.law.title, loop.position[rows] - origin, curve[rows]),
     )
     quantity = "force" if loop.unit[1] == "N" else "torque"
     return Picture(
-        "hysteresis", f"Hysteresis: {template.law.title}", words[0].upper() + words[1:],
-        f"displacement ({axis_unit(loop.unit[0])})", f"friction {quantity} ({axis_unit(loop.unit[1])})", traces,
+        name, title, words[0].upper() + words[1:], f"displacement ({axis_unit(loop.unit[0])})",
+        f"friction {quantity} ({axis_unit(loop.unit[1])})", traces,
     )  # fmt: skip

@@ -31,6 +31,7 @@ from stickslip.identify.presliding.hysteresis import (
     loop_picture,
     relative_error,
     turning_points,
+    whole_picture,
 )
 from stickslip.identify.presliding.known_curve import describe_unused, static_levels, transfer_curve
 from stickslip.identify.presliding.loop_uncertainty import add_systematic_errors
@@ -245,7 +246,8 @@ def identify_presliding(
     notes = (*notes, *describe_unused(curve, model), *loop_notes(straight, model, rows, rest))
     return Identification(
         "presliding", model, estimates, fitted.correlation, loop_misfit(straight, simulated, rows, rest, fitted),
-        notes, (), (loop_picture(straight, simulated, rows, rest, model),),
+        notes, (),
+        (loop_picture(straight, simulated, rows, rest, model), whole_picture(straight, simulated, model)),
         {"elements": elements, "loop_errors": errors, "curve": simulated, "rows": rows},
     )  # fmt: skip
 

@@ -33,6 +33,8 @@ NEAR = 1.15
 """Peaks of several records within this factor are one mode."""
 PEAK = 1.4
 """Factor over the rigid axis's response, and over the valleys beside it, that makes a resonance."""
+APART = 3.0
+"""dB between the responses to two torques, a factor of 1.4, from which on the axis is not linear."""
 CHANCE = 0.01
 """That some frequency of a record counts as coherent where nothing is."""
 MODE_BAND, FEWEST = 6.0, 16.0
@@ -199,7 +201,7 @@ def _result(
     return Identification(
         "inertia", None, tuple(estimates), covariance / np.outer(std, std),
         {"lowest_coherence": float(min(r.coherence.min() for r in responses))}, tuple(notes),
-        pictures=(_picture(responses, solution, axis),),
+        pictures=(_picture(responses, solution, axis, band),),
         details={"responses": tuple(responses), "resonances": tuple(resonances), "axis": axis, "band": band},
     )  # fmt: skip
 
@@ -277,7 +279,9 @@ def rise(level: Array, spread: Array, factor: float) -> float:
     return float(np.max(sure))
 
 
-def _picture(responses: Sequence[Response], solution: Array, axis: ServoAxis) -> Picture:
+def _picture(
+    responses: Sequence[Response], solution: Array, axis: ServoAxis, band: tuple[float, float]
+) -> Picture:
     decibel = [
         Trace(
             f"{r.amplitude:.3g} {axis.unit('N·m')} RMS", r.frequency,
@@ -289,7 +293,28 @@ def _picture(responses: Sequence[Response], solution: Array, axis: ServoAxis) ->
     s = 2j * math.pi * f
     rigid = 1.0 / (solution[0] * s**2 + solution[1] * s)
     return Picture(
-        "inertia", "Frequency response", "The rigid axis explains the response below its resonances",
+        "inertia", "Frequency response", _compared(responses, band),
         "frequency (Hz)", f"position over torque (dB of 1 {axis.unit('rad')}/({axis.unit('N·m')}))",
         (*decibel, Trace("rigid axis", f, 20.0 * np.log10(np.abs(rigid)), "dashes")), "log",
     )  # fmt: skip
+
+
+def _compared(responses: Sequence[Response], band: tuple[float, float]) -> str:
+    """Say whether the responses to the least and the greatest torque differ where the band starts (thesis 4.2)."""
+    least, most = (pick(responses, key=lambda r: r.amplitude) for pick in (min, max))
+    slow, fast = (_gap(least, most, *span) for span in ((band[0], 2.0 * band[0]), (band[1], math.inf)))
+    if not slow >= APART:  # True as well where nothing can be compared.
+        return "The rigid axis explains the response below its resonances"
+    above = f" and by {fast:.2g} dB above {band[1]:g} Hz" if math.isfinite(fast) else ""
+    return f"The responses differ by {slow:.2g} dB from {band[0]:g} to {2.0 * band[0]:g} Hz{above}: friction acts"
+
+
+def _gap(one: Response, other: Response, low: float, high: float) -> float:
+    """Return the median difference of two responses between two frequencies, dB; NaN if none is coherent in both."""
+    f = one.frequency
+    level = np.interp(f, other.frequency, 20.0 * np.log10(np.abs(other.h1)))
+    coherent = np.interp(f, other.frequency, other.coherence) >= COHERENT
+    shown = (f >= low) & (f <= high) & (one.coherence >= COHERENT) & coherent
+    if not np.any(shown):
+        return math.nan
+    return float(np.median(np.abs(20.0 * np.log10(np.abs(one.h1)) - level)[shown]))

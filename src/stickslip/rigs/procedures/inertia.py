@@ -4,6 +4,9 @@ The thesis excites the axis from rest, and its responses differ at low frequenci
 the axis runs, so the sign stays: a damping loop keeps the mean speed, and a run below the least speed is refused. The
 power grows with the frequency up to the end of the band, which changes the speed less than white noise. If the rig's
 torque or speed does not allow the requested currents, all are reduced by the same factor.
+
+``about = "rest"`` repeats the thesis's experiment, white noise without a loop: friction then sticks and changes its
+sign, and the responses to the two currents differ at low frequencies (figure 4.4).
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.errors import RigError
+from stickslip.errors import InputError, RigError
 from stickslip.record import Record
 from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
@@ -41,6 +44,9 @@ DAMPING = 20.0
 """Frequency at which damping loop and inertia have equal impedance, Hz."""
 BIAS = 0.6
 """Share of the torque limit for the running speed; if it needs more, it runs slower."""
+ABOUT = ("speed", "rest")
+LEAST_MOTION = 0.01
+"""Least motion about rest, rad: beyond pre-sliding, which takes about a milliradian."""
 CREST = 2.2
 """Largest value of the noise over its RMS."""
 
@@ -51,7 +57,7 @@ class Inertia(Procedure):
 
     ``current`` in A RMS, one part of the record each, ``torque_constant`` in N·m/A, ``band`` in Hz, ``speed`` the mean
     and ``least`` the least speed in rad/s (speed 0: automatic, at most half of the rig's limit), ``duration`` of each
-    part in s.
+    part in s, ``about`` "speed" or "rest".
     """
 
     name: ClassVar[str] = "inertia"
@@ -65,9 +71,17 @@ class Inertia(Procedure):
     least: float = 2.0
     duration: float = 120.0
     seed: int = 1
+    about: str = "speed"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.about not in ABOUT:
+            raise InputError(f"inertia: about = {self.about!r} must be {' or '.join(ABOUT)}")
 
     def plan(self, rig: Rig) -> Plan:
         """Plan all parts one after the other."""
+        if self.about == "rest":
+            return self._plan_at_rest(rig)
         v = self.speed or 0.5 * rig.limits.speed
         total = len(self.current) * (self.duration + 12.0) + 12.0
         each = ", ".join(f"{c:g}" for c in self.current)
@@ -82,13 +96,35 @@ class Inertia(Procedure):
             3.0 * len(self.current),
         )  # fmt: skip
 
+    def _plan_at_rest(self, rig: Rig) -> Plan:
+        """Noise without a loop; how far it moves the axis is for friction to say, and the rig's limits end it."""
+        each = ", ".join(f"{c:g}" for c in self.current)
+        text = (
+            f"random currents of {each} A RMS up to {self.band:g} Hz, {self.duration:g} s each, the loop open"
+        )
+        most = CREST * max(self.current) * self.torque_constant
+        return Plan(
+            len(self.current) * (self.duration + 1.0), 0.0, 0.0, most, (text,), float(len(self.current))
+        )
+
     def steps(self, rig: Rig) -> Steps:
-        """Estimate roughly, then speed up, excite and stop for each current."""
+        """Estimate roughly, then speed up, excite and stop for each current; about rest, excite alone."""
+        if self.about == "rest":
+            yield from self._excited_at_rest(rig)
+            return
         inertia, _ = yield from rough_inertia(rig)
         follow = holder(rig, inertia, 8.0)
         speed, bias = yield from self._running(rig, follow, inertia)
         for place, current in enumerate(self.current):
             yield from self._part(rig, follow, inertia, speed, bias, place, current)
+
+    def _excited_at_rest(self, rig: Rig) -> Steps:
+        yield now(rig)
+        count = samples(rig, self.duration)
+        for place, current in enumerate(self.current):
+            torque = self.noise(count, rig.sample_time, current * self.torque_constant, place)
+            yield Step(setpoints(count, torque=torque), keep=True, label=f"{current:.3g} A RMS", pause=1.0)
+            yield Step(setpoints(round(0.5 / rig.sample_time)))
 
     def _running(
         self, rig: Rig, follow: Controller, inertia: float
@@ -152,12 +188,15 @@ class Inertia(Procedure):
         return min(max(self.current) * self.torque_constant, 0.6 * room / CREST, slowest)
 
     def noise(self, count: int, dt: float, rms: float, place: int) -> Array:
-        """Return noise with power proportional to the frequency up to the end of the band, with peaks of at most
-        `CREST` times RMS."""
+        """Return noise up to the end of the band, with peaks of at most `CREST` times RMS.
+
+        Over a running speed its power grows with the frequency.
+        """
         rng = np.random.default_rng((self.seed, place))
         f = np.fft.rfftfreq(count, dt)
         inside = (f <= self.band) & (f >= 0.5 * self.lowest)
-        noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(count)) * np.sqrt(f) * inside, count)
+        shape = np.sqrt(f) * inside if self.about == "speed" else 1.0 * inside
+        noise = np.fft.irfft(np.fft.rfft(rng.standard_normal(count)) * shape, count)
         for _ in range(20):
             noise /= float(np.sqrt(np.mean(noise**2)))
             noise = np.fft.irfft(np.fft.rfft(np.clip(noise, -0.9 * CREST, 0.9 * CREST)) * inside, count)
@@ -177,19 +216,24 @@ class Inertia(Procedure):
         )
 
     def checks(self, record: Record, rig: Rig) -> tuple[Check, ...]:
-        """Check that the speed stayed above the least, and report the current."""
-        lowest = float(np.min(slopes(record, SLOW)))
+        """Check that the speed stayed above the least, or that the axis left its rest, and report the current."""
         excited = record["torque_setpoint"]
         parts = np.array_split(excited, len(self.current))
         applied = ", ".join(f"{float(np.std(p)) / self.torque_constant:.3g}" for p in parts)
         asked = ", ".join(f"{c:g}" for c in self.current)
+        current_check = Check("current", True, f"{applied} A RMS applied of {asked} requested")
+        if self.about == "rest":
+            moved = float(np.ptp(record["position"]))
+            text = f"the axis moved within {moved:.3g} rad; if it did not, raise the current"
+            return Check("moved", moved > LEAST_MOTION, text), current_check
+        lowest = float(np.min(slopes(record, SLOW)))
         return (
             Check(
                 "reversal", lowest >= self.least,
                 f"the lowest speed over {1e3 * SLOW:g} ms was {lowest:.3g} rad/s, at least {self.least:g} is needed so "
                 "that friction keeps its sign; if it fails, raise speed or lower current",
             ),
-            Check("current", True, f"{applied} A RMS applied of {asked} requested"),
+            current_check,
         )  # fmt: skip
 
 

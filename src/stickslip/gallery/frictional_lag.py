@@ -7,13 +7,11 @@ parameter C; in LuGre the lag is the time in which the bristles take another def
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
 from stickslip import Model, Record, Reference, law, respond
-from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.analysis_pictures import Drawn
+from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
 
 GMS = Model("gms", **law("gms").example)
@@ -47,9 +45,9 @@ def width(record: Record) -> float:
     return float(record["friction_torque"][3 * n // 4] - record["friction_torque"][n // 4])
 
 
-def main(path: Path) -> None:
+def picture() -> Drawn:
     """Draw the loops."""
-    panels = []
+    panels: list[Panel] = []
     for name, model in (("GMS", GMS), ("LuGre", LUGRE)):
         records = {f: swung(model, f) for f in FREQUENCIES}
         curves = [
@@ -59,8 +57,4 @@ def main(path: Path) -> None:
         note = f"{name}: width " + ", ".join(f"{1e3 * width(r):.2g}" for r in records.values()) + " mN·m"
         panels.append(Panel(curves, "torque (N·m)", "velocity (mrad/s)", note=note))
     message = "Torque over a velocity that swings about 11 mrad/s; width at the mean velocity"
-    draw(path, "Frictional lag widens with the frequency", message, panels, 2.0)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "frictional_lag"))
+    return "Frictional lag widens with the frequency", message, panels, 2.0

@@ -7,15 +7,16 @@ loses a part of its friction so; parameters found in the first minute are wrong 
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from stickslip import Model, Record, Reference, law, respond
-from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.analysis_pictures import Drawn
+from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
 
+Array = np.ndarray[Any, np.dtype[np.float64]]
 DRIFT, TIME = -0.3, 60.0  # of the torque in the long run; s
 PERIOD, PERIODS, SAMPLES = 10.0, 24, 2000  # s; and samples in each
 GREY, BLUE = Style("#777777", (0, (4, 1.2)), 1.2), Style("#0072B2", "-", 1.3)
@@ -27,7 +28,7 @@ def warming(name: str) -> Model:
     return Model(name, {"time_dependence": "settling"}, **law(name).example, drift=DRIFT, drift_time=TIME)
 
 
-def factor(time: np.ndarray) -> np.ndarray:
+def factor(time: Array) -> Array:
     """What is left of the friction, -."""
     return 1.0 + DRIFT * (1.0 - np.exp(-time / TIME))
 
@@ -38,7 +39,7 @@ def swung(model: Model) -> Record:
     return respond(model, motion, np.linspace(0.0, PERIOD * PERIODS, PERIODS * SAMPLES + 1), tolerance=1e-9)
 
 
-def main(path: Path) -> None:
+def picture() -> Drawn:
     """Draw torque over time, and over velocity in the second and the last period."""
     record = swung(warming("gms"))
     torque, speed = record["friction_torque"], 1e3 * record["velocity"]
@@ -59,8 +60,4 @@ def main(path: Path) -> None:
     ]
     over_speed = Panel(loops, "torque (N·m)", "velocity (mrad/s)", legend="upper left")
     message = f"GMS that loses {-100 * DRIFT:.0f} % of its friction with a time constant of {TIME:.0f} s"
-    draw(path, "Friction that depends on time", message, [over_time, over_speed], 2.0)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "time_dependence"))
+    return "Friction that depends on time", message, [over_time, over_speed], 2.0

@@ -8,13 +8,11 @@ the reference: a servo axis in a slow ramp does the same.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
-from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.analysis_pictures import Drawn
+from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
 
 CONTACT = Model("lugre", sigma0=1e5, sigma1=1e5**0.5, sigma2=0.4, fc=1.0, fs=1.5, vs=1e-3)
@@ -37,7 +35,7 @@ def rests(record: Record) -> list[tuple[float, float]]:
     return [(float(a), float(b)) for a, b in spans if b - a >= 0.1]
 
 
-def main(path: Path) -> None:
+def picture() -> Drawn:
     """Draw position, velocity and force."""
     record = dragged()
     end = (0.0, float(record.time[-1]))
@@ -59,14 +57,4 @@ def main(path: Path) -> None:
         ),
     ]  # fmt: skip
     count = len(rests(record))
-    draw(
-        path,
-        "Stick-slip of a dragged mass",
-        f"LuGre contact; the mass rests {count} times in 20 s",
-        panels,
-        1.5,
-    )
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "stick_slip"))
+    return "Stick-slip of a dragged mass", f"LuGre contact; the mass rests {count} times in 20 s", panels, 1.5

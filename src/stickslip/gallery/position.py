@@ -8,13 +8,11 @@ multiplies the torque of the law, as a load that changes with the position would
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
 from stickslip import Model, Record, Reference, law, respond
-from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.analysis_pictures import Drawn
+from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
 
 HARMONICS = {1: 0.10, 6: 0.04}  # periods per revolution: share of the torque
@@ -46,9 +44,9 @@ def harmonic(record: Record, periods: int) -> float:
     return float(2.0 * abs(part) / abs(torque.mean()))
 
 
-def main(path: Path) -> None:
+def picture() -> Drawn:
     """Draw the size of the torque over the position, both ways."""
-    curves = []
+    curves: list[Curve] = []
     for name, speed, style in (("forward", SPEED, FORWARD), ("backward", -SPEED, BACKWARD)):
         record = turned(rippling("gms"), speed)
         order = np.argsort(record["position"])
@@ -57,8 +55,4 @@ def main(path: Path) -> None:
     note = ", ".join(f"{100 * share:.0f} % at {n} per revolution" for n, share in HARMONICS.items())
     panel = Panel(curves, "|torque| (N·m)", "position (°)", legend="lower left", note=note)
     message = f"GMS at {1e3 * SPEED:.0f} mrad/s: the same ripple from both sides"
-    draw(path, "Friction that depends on the position", message, [panel], 2.4)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "position"))
+    return "Friction that depends on the position", message, [panel], 2.4

@@ -8,16 +8,16 @@ rates are those of Canudas de Wit et al. (1995): Fs = 1.5 N, Fc = 1 N, 1 kg.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
-from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.analysis_pictures import Drawn
+from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
 
-LEVELS = {"fs": 1.5, "fc": 1.0, "vs": 1e-3, "sigma2": 0.4}  # N, N, m/s, N·s/m
+LEVELS: dict[str, Any] = {"fs": 1.5, "fc": 1.0, "vs": 1e-3, "sigma2": 0.4}  # N, N, m/s, N·s/m
 LUGRE = Model("lugre", sigma0=1e5, sigma1=1e5**0.5, **LEVELS)
 GMS = Model("gms", k=[5e4, 3e4, 2e4], alpha=[1 / 3] * 3, c=100.0, **LEVELS)
 STYLES = {"LuGre": Style("#D55E00", (0, (4, 1.2)), 1.4, "s"), "GMS": Style("#0072B2", "-", 1.4, "o")}
@@ -39,7 +39,7 @@ def breakaway(record: Record) -> float:
     return float(record["friction_torque"][resting].max())
 
 
-def main(path: Path) -> None:
+def picture() -> Drawn:
     """Draw break-away force over rate."""
     panel = Panel(
         [
@@ -49,8 +49,4 @@ def main(path: Path) -> None:
         "break-away force (N)", "rate of the applied force (N/s)", x_scale="log",
     )  # fmt: skip
     message = "From the static level of 1.5 N towards the Coulomb level of 1 N"
-    draw(path, "Break-away force falls with the rate of the force", message, [panel], 2.2)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "breakaway"))
+    return "Break-away force falls with the rate of the force", message, [panel], 2.2

@@ -8,13 +8,13 @@ force that pulses to one side, always below break-away, it drifts where GMS stan
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
+import itertools
 
 import numpy as np
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, law, respond, simulate
-from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.analysis_pictures import Drawn
+from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
 
 GMS = Model("gms", **law("gms").example)
@@ -24,17 +24,25 @@ TURNS = [0.0, 25e-6, -25e-6, 11e-6, -11e-6, 25e-6]  # rad
 SPEED = 5e-6  # rad/s, mean
 
 
+def turning_times() -> list[float]:
+    """Return the times of the turning points, s."""
+    times = [0.0]
+    for start, end in itertools.pairwise(TURNS):
+        times.append(times[-1] + abs(end - start) / SPEED)
+    return times
+
+
 def loop(model: Model) -> Record:
     """Move a contact slowly from turning point to turning point."""
-    time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(TURNS))) / SPEED])
-    motion = Reference.table(time.tolist(), TURNS)
+    time = turning_times()
+    motion = Reference.table(time, TURNS)
     return respond(model, motion, np.linspace(0.0, time[-1], 3001), tolerance=1e-9)
 
 
 def gap(record: Record) -> float:
     """Torque where the interruption began less torque where its loop comes back there, N·m."""
-    third, last = np.cumsum(np.abs(np.diff(TURNS)))[[2, 3]] / SPEED
-    began = np.interp(third, record.time, record["friction_torque"])
+    *_, third, last, _ = turning_times()
+    began = float(np.interp(third, record.time, record["friction_torque"]))
     back = record.time > last
     return float(began - np.interp(TURNS[3], record["position"][back], record["friction_torque"][back]))
 
@@ -57,7 +65,7 @@ def drift(record: Record) -> float:
     return float((now - then) / (end - half))
 
 
-def main(path: Path) -> None:
+def picture() -> Drawn:
     """Draw the loops and the drift."""
     loops = {name: loop(model) for name, model in (("GMS", GMS), ("LuGre", LUGRE))}
     pulses = {name: pulsed(model) for name, model in (("GMS", GMS), ("LuGre", LUGRE))}
@@ -84,8 +92,4 @@ def main(path: Path) -> None:
     message = (
         f"Under the pulsing torque LuGre creeps by {creep['LuGre']} µrad/s, GMS by {creep['GMS']} µrad/s"
     )
-    draw(path, "Hysteresis, memory and drift in pre-sliding", message, panels, 1.9)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "presliding"))
+    return "Hysteresis, memory and drift in pre-sliding", message, panels, 1.9

@@ -7,13 +7,11 @@ the same, so that the torque is continuous at a reversal.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 
 from stickslip import Model, Record, Reference, law, respond
-from stickslip.report.plots import Curve, Panel, draw
+from stickslip.report.analysis_pictures import Drawn
+from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
 
 SHARE = 0.7  # of the static and of the Coulomb torque is left for v < 0
@@ -35,7 +33,7 @@ def loop(model: Model) -> Record:
     return Record(whole.time[late], {n: x[late] for n, x in whole.channels.items()}, whole.units)
 
 
-def main(path: Path) -> None:
+def picture() -> Drawn:
     """Draw torque over velocity."""
     curves = [
         Curve(1e3 * r["velocity"], r["friction_torque"], name, style)
@@ -43,8 +41,4 @@ def main(path: Path) -> None:
     ]
     panel = Panel(curves, "torque (N·m)", "velocity (mrad/s)", legend="upper left")
     message = f"GMS with {100 * SHARE:.0f} % of its static and Coulomb torque for v < 0"
-    draw(path, "Friction that depends on the direction", message, [panel], 2.4)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "direction"))
+    return "Friction that depends on the direction", message, [panel], 2.4
