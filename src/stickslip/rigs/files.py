@@ -27,7 +27,7 @@ from stickslip.rigs.rig import Limits, Rig, RigKind
 
 
 def read_rig(path: str | os.PathLike[str]) -> Rig:
-    """Return the rig of a TOML file, not yet open.
+    """Return the rig of the TOML file at `path`, not yet open.
 
     Raises
     ------

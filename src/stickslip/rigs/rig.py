@@ -171,7 +171,7 @@ class Limits:
             raise ParameterError("limits: temperature = nan °C must be a number")
 
     def narrowed(self, narrower: Limits) -> Limits:
-        """Return the tighter limits, which may not be wider than these.
+        """Return the tighter limits `narrower`, which may not be wider than these.
 
         Raises
         ------
