@@ -27,9 +27,9 @@ from stickslip.simulation import accuracy
 from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
-from stickslip.study import study as studies
-from stickslip.study.planned_run import PlannedRun
-from stickslip.sweep.numbers import value_of, varied
+from stickslip.studies import study as studies
+from stickslip.studies.planned_run import PlannedRun
+from stickslip.sweeps.numbers import value_of, varied
 
 VARIED = ("friction.fs", "friction.fc", "friction.sigma2", "friction.vs", "friction.c", "axis.inertia")
 LONGEST = {"low": 1.5, "high": 4.0, "step": 1.5}

@@ -19,10 +19,10 @@ from tempfile import TemporaryDirectory
 from coverage_records import make
 from stickslip.errors import StickslipError
 from stickslip.identification.axis import identify_axis
-from stickslip.identify.compare.change import compare_models
-from stickslip.identify.experiment import experiment_of
-from stickslip.identify.identified_file import read_identified
-from stickslip.identify.model_file import write_model
+from stickslip.identification.compare.change import compare_models
+from stickslip.identification.experiment import experiment_of
+from stickslip.identification.identified_file import read_identified
+from stickslip.identification.model_file import write_model
 from stickslip.machines.servo import ServoAxis
 
 RAISED = 1.1

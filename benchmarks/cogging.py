@@ -23,12 +23,12 @@ import numpy as np
 
 import stickslip as ss
 from stickslip.control.position import position_feedforward
-from stickslip.identify.cogging import identify_cogging
-from stickslip.identify.cogging.fitting import fit
-from stickslip.identify.cogging.orders import grid_of, moving_columns, path
-from stickslip.identify.cogging.result import estimates_of
-from stickslip.identify.cogging.rows import places_of
-from stickslip.identify.estimate import Identification
+from stickslip.identification.cogging import identify_cogging
+from stickslip.identification.cogging.fitting import fit
+from stickslip.identification.cogging.orders import grid_of, moving_columns, path
+from stickslip.identification.cogging.result import estimates_of
+from stickslip.identification.cogging.rows import places_of
+from stickslip.identification.estimate import Identification
 from stickslip.machines.angle import AngleMap, harmonic_sum
 from stickslip.machines.files import machine
 from stickslip.machines.machine import Machine

@@ -18,7 +18,7 @@ import numpy as np
 
 from stickslip.control.catalogue import Belief, compensated
 from stickslip.control.controller import Controller
-from stickslip.export.c99_controller import write
+from stickslip.exports.c99_controller import write
 from stickslip.model import Model
 
 STEPS, BLOCKS = 20_000, 41

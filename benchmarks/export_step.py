@@ -16,8 +16,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from stickslip import plugins
-from stickslip.export import c99
-from stickslip.export.job import Job
+from stickslip.exports import c99
+from stickslip.exports.job import Job
 from stickslip.model import Model
 
 HERE = Path(__file__).parent

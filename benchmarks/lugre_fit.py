@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from stickslip import Controller, Gains, Model, Reference, RigidAxis, simulate
-from stickslip.identify.presliding.lugre_dynamics import Response, fit_position
+from stickslip.identification.presliding.lugre_dynamics import Response, fit_position
 
 INERTIA = 3.8623e-4
 SLIDING = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}

@@ -31,7 +31,7 @@ from ordinary_coverage import AXIS, cells  # noqa: E402
 from stickslip.errors import StickslipError  # noqa: E402
 from stickslip.identification.search import Asked  # noqa: E402
 from stickslip.identification.sliding import estimate_sliding  # noqa: E402
-from stickslip.identify.experiment import Experiment  # noqa: E402
+from stickslip.identification.experiment import Experiment  # noqa: E402
 
 NAMES = ("inertia", "fc", "sigma2")
 BAR = 1.5

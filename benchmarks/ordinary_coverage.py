@@ -32,7 +32,7 @@ import ordinary_logs as logs  # noqa: E402
 from stickslip.errors import StickslipError  # noqa: E402
 from stickslip.identification.axis import identify_axis  # noqa: E402
 from stickslip.identification.sliding import estimate_sliding  # noqa: E402
-from stickslip.identify.experiment import Experiment  # noqa: E402
+from stickslip.identification.experiment import Experiment  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402
 
 AXIS = ServoAxis(drive_side="load")

@@ -228,7 +228,7 @@ class Plain:
 
 def identified(log: logs.Log, folder: Path) -> dict[str, Any]:
     """The model of the log, as a user gets it; what is called identified, and its error in parts of the truth."""
-    from stickslip.identify.identified_file import read_identified
+    from stickslip.identification.identified_file import read_identified
 
     if not (folder / "model.toml").exists():
         table = log.frame()

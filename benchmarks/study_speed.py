@@ -44,8 +44,8 @@ from hybrid_loop import HybridLoop
 from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
-from stickslip.study import study as studies
-from stickslip.study.planned_run import PlannedRun
+from stickslip.studies import study as studies
+from stickslip.studies.planned_run import PlannedRun
 
 TIMES_BDF, TIMES_C = 200, 1.5
 LONGEST = 1e-3  # s, lest SciPy step over an event

@@ -16,9 +16,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.study.study import load as load_study
-from stickslip.sweep import block, measured, metric_check
-from stickslip.sweep.plan import Sweep, load
+from stickslip.studies.study import load as load_study
+from stickslip.sweeps import block, measured, metric_check
+from stickslip.sweeps.plan import Sweep, load
 
 EXACT = 3.3e-11
 WANTED, MOST_FLAGGED = 0.01, 0.05

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from scipy import signal
 
-from stickslip.identify.doctor import examine
-from stickslip.identify.fit.profile import inverse_information, long_run
-from stickslip.identify.regression.inverse import correlation_lags
+from stickslip.identification.doctor import examine
+from stickslip.identification.fit.profile import inverse_information, long_run
+from stickslip.identification.regression.inverse import correlation_lags
 from stickslip.readers.reading import read
 
 BAND = 5.0  # Hz: the torques are sinusoids of 0.8 and 1.6 Hz, and this holds their third harmonics

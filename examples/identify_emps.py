@@ -20,8 +20,8 @@ import numpy as np
 from scipy.io import loadmat
 
 from stickslip.identification.axis import identify_axis
-from stickslip.identify.experiment import Experiment
-from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.simulation.recorded_input.simulation import Loop
 

@@ -26,8 +26,8 @@ import numpy as np
 
 from stickslip import plugins
 from stickslip.identification.axis import identify_axis
-from stickslip.identify.axis.output import Extras, OutputError, output_error
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.output_error.output import Extras, OutputError, output_error
+from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import Motor, ServoAxis
 from stickslip.simulation.recorded_input.simulation import Loop
 

@@ -13,10 +13,10 @@ import stickslip as ss
 from stickslip.approval import approved_file
 from stickslip.cli import main
 from stickslip.errors import CodeRefused
-from stickslip.identify.identified_file import read_identified
+from stickslip.identification.identified_file import read_identified
 from stickslip.machines.files import machine
 from stickslip.rigs.files import read_rig
-from stickslip.study.plan import load, load_run
+from stickslip.studies.plan import load, load_run
 
 COULOMB = Path(str(ss.law("coulomb").step.__code__.co_filename)).read_text(encoding="utf-8")
 MODEL = 'law = "sent.py"\n[parameters]\nfc = 0.3\nsigma2 = 0.01\n'

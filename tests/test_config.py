@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from stickslip.config import Document, Table, read_toml
 from stickslip.errors import ConfigError, InputError, ModelRemark
-from stickslip.study.plan import load, load_run
+from stickslip.studies.plan import load, load_run
 
 DATA = Path(__file__).parent / "data"
 

@@ -53,12 +53,8 @@ def named(node: ast.AST) -> list[str]:
 
 
 def part(module: str) -> str:
-    """The room, or the file of the package, that a module belongs to.
-
-    `identification` is the part of `identify` that has been written anew: one room until the rest has moved there.
-    """
-    name = module.split(".")[1] if module.startswith("stickslip.") else ""
-    return "identify" if name == "identification" else name
+    """The room, or the file of the package, that a module belongs to."""
+    return module.split(".")[1] if module.startswith("stickslip.") else ""
 
 
 @cache
@@ -114,8 +110,8 @@ def test_the_parts_of_the_package_have_an_order() -> None:
 
 def test_what_is_imported_by_name_is_seen() -> None:
     found = imports()
-    assert {"laws", "references"} <= found["plugins"]
-    assert "rigs" not in found["plugins"]
+    assert {"laws", "references"} <= found["models"]
+    assert "rigs" not in found["models"]
     assert named(ast.parse('import_module(f"stickslip.rigs.{x}")', mode="eval").body) == ["stickslip.rigs."]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.identify.monte_carlo import resisting_torque
+from stickslip.identification.monte_carlo import resisting_torque
 
 MOVING = np.array([[-2.0, -0.1, -1e-6], [1e-6, 0.05, 3.0]])
 MODELS = [ss.Model(ss.law(name), **ss.law(name).example) for name in ss.law_names() if ss.law(name).steady]

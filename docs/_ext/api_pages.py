@@ -10,8 +10,8 @@ import stickslip
 
 FOLDER = GENERATED / "api"
 FURTHER = {
-    "stickslip.study.study": ("load", "load_run", "run", "execute", "select"),
-    "stickslip.study.result": ("StudyResult", "Run"),
+    "stickslip.studies.study": ("load", "load_run", "run", "execute", "select"),
+    "stickslip.studies.result": ("StudyResult", "Run"),
     "stickslip.report": ("write",),
     "stickslip.report.law_pictures": ("draw_law",),
     "stickslip.rigs.loop": ("Loop",),

@@ -21,7 +21,7 @@ from stickslip.record import Record
 from stickslip.report.plots import Curve, Panel, draw
 from stickslip.report.styles import REFERENCE, Style
 from stickslip.simulation.closed_loop import simulate
-from stickslip.study.bench import Planned, planned, read_bench
+from stickslip.studies.bench import Planned, planned, read_bench
 
 FOLDER = GENERATED / "compensators"
 FAILS, WORKS = Style("#D55E00", "-", 1.2), Style("#0072B2", (0, (5, 1.5)), 1.2)

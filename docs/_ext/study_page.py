@@ -8,8 +8,8 @@ import os
 from pages import GENERATED, prose, table, write
 
 from stickslip.report import draw
-from stickslip.study.result import StudyResult
-from stickslip.study.study import load, run
+from stickslip.studies.result import StudyResult
+from stickslip.studies.study import load, run
 
 FOLDER = GENERATED / "study"
 ONLY = ["signed", "nominal"]
@@ -33,7 +33,7 @@ stickslip study thesis
 
 runs all 180 cases under both [slip rules](../../explanation/slip_rules.md), and writes the table, the figures and a
 report in which the thesis's statements are checked one by one. The file that describes it is
-`src/stickslip/study/thesis.toml` (`stickslip study thesis --print`);
+`src/stickslip/studies/thesis.toml` (`stickslip study thesis --print`);
 [how to write your own](../../howto/study_file.md).
 
 Shown here: the nominal friction under the signed rule, run when this documentation was built.

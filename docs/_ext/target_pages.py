@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pages import GENERATED, table, write
 
-from stickslip.export import TARGETS, target_named
+from stickslip.exports import TARGETS, target_named
 
 
 def make() -> None:

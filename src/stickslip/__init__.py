@@ -3,8 +3,7 @@
 From a log to a compensator: `read`, `doctor`, `identify`, `compare`, `recommend`, `export`. Simulation: `Model`,
 `RigidAxis`, `load_machine`, `Machine` and its parts (`Contact`, `TwoMassAxis`, `FlexibleAxis`, `Encoder`, ...),
 `Controller`, `Reference`, `simulate`, `respond`, `stability`. Many runs: `study`, `sweep`, `tune`, `learn`. `warm_up`
-compiles everything in advance. Each has its own help, `help(stickslip.identify)`; `identify`, `recommend`, `export`,
-`study` and `sweep` are packages as well, and so stand under PACKAGE CONTENTS rather than FUNCTIONS.
+compiles everything in advance. Each has its own help, `help(stickslip.identify)`.
 
 The public names below are loaded when first used, so that importing the package costs nothing.
 """
@@ -12,8 +11,6 @@ The public names below are loaded when first used, so that importing the package
 from __future__ import annotations
 
 import importlib
-import sys
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -85,13 +82,16 @@ _HOME = {
         "spec": "Law Mode Par",
         "verbs.compare": "compare",
         "verbs.doctor": "doctor",
-        "verbs.export": "ExportResult",
+        "verbs.export": "ExportResult export",
         "verbs.identification": "IdentificationResult",
+        "verbs.identify": "identify",
         "verbs.learn": "LearningResult learn",
         "verbs.reading": "read",
+        "verbs.recommend": "recommend",
         "verbs.recommendation": "RecommendationResult",
         "verbs.stability": "stability",
-        "verbs.sweep": "SweepResult",
+        "verbs.study": "study",
+        "verbs.sweep": "SweepResult sweep",
         "verbs.tune": "tune",
     }.items()
     for name in names.split()
@@ -160,50 +160,8 @@ __all__ = [
 ]
 
 
-_ROOMS = {name: f"verbs.{name}" for name in ("export", "identify", "recommend", "study", "sweep")}
-"""Functions with the name of a package that holds more (docs/decisions/0023)."""
-
-
-class _Room(ModuleType):
-    """A package that, called, is the function of its name."""
-
-    @property
-    def __wrapped__(self) -> Any:
-        name = self.__name__.rpartition(".")[2]
-        return getattr(importlib.import_module(f"stickslip.{_ROOMS[name]}"), name)
-
-    def __call__(self, *args: Any, **options: Any) -> Any:
-        return self.__wrapped__(*args, **options)
-
-    @property
-    def __doc__(self) -> str | None:  # type: ignore[reportIncompatibleVariableOverride]
-        # What `help` shows of a module is this text alone.
-        from stickslip.call_text import call_in
-
-        return call_in(self.__wrapped__)
-
-    @property
-    def __signature__(self) -> Any:
-        import inspect
-
-        return inspect.signature(self.__wrapped__)
-
-
-class _Package(ModuleType):
-    """This module: a room becomes callable when the import system puts it here, whoever imports it first."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name in _ROOMS and type(value) is ModuleType:
-            value.__class__ = _Room
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
-
 
 def __getattr__(name: str) -> Any:
-    if name in _ROOMS:
-        return importlib.import_module(f"stickslip.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'stickslip' has no attribute {name!r}")
     value = getattr(importlib.import_module(f"stickslip.{_HOME[name]}"), name)
@@ -212,6 +170,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """What is public: no helper of this file, and no name that it imports for itself."""
-    rooms = [n for n, x in globals().items() if getattr(x, "__name__", "") == f"{__name__}.{n}"]
-    return sorted({*(n for n in globals() if n.startswith("__")), *rooms, *__all__})
+    """Return the public names, without the helpers of this file and what it imports."""
+    return sorted({*(n for n in globals() if n.startswith("__")), *__all__})

@@ -22,8 +22,8 @@ from stickslip.control.linear import place
 from stickslip.control.registry import control_law, control_law_names
 from stickslip.errors import InputError
 from stickslip.machines.files import machine
-from stickslip.study.controller_confirmed import confirmed_controller, scaled
-from stickslip.study.stability_map import moved
+from stickslip.studies.controller_confirmed import confirmed_controller, scaled
+from stickslip.studies.stability_map import moved
 
 T = 1e-3
 DRY = machine("thesis-dry")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identification.estimate import Estimate, Identification
 
 LAW = ss.Model("coulomb", fc=0.3)
 AXIS, SINE = ss.RigidAxis(1e-3, LAW), ss.Reference("sine", amplitude=0.1, frequency=1.0)

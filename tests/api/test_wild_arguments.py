@@ -18,15 +18,15 @@ import pytest
 import stickslip as ss
 from stickslip.analyse.controller_margins import ControllerStability
 from stickslip.config import Document, Table
-from stickslip.export import target_named
-from stickslip.identify.compare.change import Comparison
-from stickslip.identify.doctor import Diagnosis
-from stickslip.identify.estimate import Identification
-from stickslip.identify.identified_file import Identified
+from stickslip.exports import target_named
+from stickslip.identification.compare.change import Comparison
+from stickslip.identification.doctor import Diagnosis
+from stickslip.identification.estimate import Identification
+from stickslip.identification.identified_file import Identified
 from stickslip.machines.drivetrain import LinearContact
-from stickslip.recommend.recommendation import Recommendation
-from stickslip.sweep.plan import Sweep
-from stickslip.sweep.tune import Tuned
+from stickslip.recommendation.recommendation import Recommendation
+from stickslip.sweeps.plan import Sweep
+from stickslip.sweeps.tune import Tuned
 from stickslip.verbs import learn
 from stickslip.verbs.reading import Reading
 

@@ -177,7 +177,7 @@ def test_rerun(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_an_interruption_says_how_to_go_on(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from stickslip.study import study as studies
+    from stickslip.studies import study as studies
 
     real, calls = studies.execute, []
 
@@ -201,7 +201,7 @@ def test_an_interruption_says_how_to_go_on(
 def test_a_sweep_that_is_interrupted_while_it_is_timed_says_how_to_go_on(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    from stickslip.sweep import forecast
+    from stickslip.sweeps import forecast
 
     def interrupted(*_: Any) -> None:
         raise KeyboardInterrupt
@@ -310,7 +310,7 @@ def test_a_reader_that_leaves_early(folder: Path) -> None:
 
 
 def test_a_chance_that_there_is_not_is_a_dash() -> None:
-    from stickslip.identify.compare.text import chance
+    from stickslip.identification.compare.text import chance
 
     assert [chance(p) for p in (float("nan"), 0.25, 1e-9)] == ["-", "0.25", "< 1e-06"]
 

@@ -14,10 +14,10 @@ import pytest
 import tomli_w
 
 from stickslip.cli import main
-from stickslip.identify.compare import text
-from stickslip.identify.compare.change import compare_models
-from stickslip.identify.compare.levels import Change
-from stickslip.identify.identified_file import read_identified
+from stickslip.identification.compare import text
+from stickslip.identification.compare.change import compare_models
+from stickslip.identification.compare.levels import Change
+from stickslip.identification.identified_file import read_identified
 from stickslip.report.identification import panel_of
 from support.identified_files import STRIBECK, written
 

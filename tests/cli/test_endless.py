@@ -10,9 +10,9 @@ import pytest
 
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.identify.presliding.hysteresis import Loop
-from stickslip.identify.presliding.presliding import GRID, identify_presliding
-from stickslip.identify.regression.inverse import refuse_harmonics
+from stickslip.identification.presliding.hysteresis import Loop
+from stickslip.identification.presliding.presliding import GRID, identify_presliding
+from stickslip.identification.regression.inverse import refuse_harmonics
 from stickslip.model import Model
 from stickslip.readers import read
 from stickslip.record import Record

@@ -13,7 +13,7 @@ import stickslip
 from stickslip import compiling, jit
 from stickslip.cli import main, parser_of, sweep, warm_up
 from stickslip.control.controller import Controller
-from stickslip.sweep import forecast
+from stickslip.sweeps import forecast
 from stickslip.verbs.recommend import loop_of
 
 
@@ -122,8 +122,8 @@ def test_warm_up_compiles_the_loops_that_drives_have(loop, more):
 
 
 def test_a_long_sweep_says_how_long_before_it_starts(monkeypatch, capsys):
-    monkeypatch.setattr("stickslip.sweep.forecast.paces_of", lambda big: (1.0,))
-    monkeypatch.setattr("stickslip.sweep.forecast.seconds_of", lambda big, paces: 36_000.0)
+    monkeypatch.setattr("stickslip.sweeps.forecast.paces_of", lambda big: (1.0,))
+    monkeypatch.setattr("stickslip.sweeps.forecast.seconds_of", lambda big, paces: 36_000.0)
     many, few = (make_dataclass("Cases", [("cases", int), ("sizes", tuple)])(n, ()) for n in (20_000, 10))
     assert sweep.announced(many, 2).sizes == (4,)
     assert "20000 closed loops, about 5.0 h on 2 cores; --cases reduces the number" in capsys.readouterr().err

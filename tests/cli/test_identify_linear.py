@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.identify.identified_file import read_identified
+from stickslip.identification.identified_file import read_identified
 
 ANGULAR = re.compile(r"N·m|(?<![a-z])m?rad(?![a-z])|kg·m²")
 

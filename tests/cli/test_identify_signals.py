@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.experiment import Experiment
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 from support import axis_cases as cases
 

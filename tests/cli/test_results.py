@@ -58,7 +58,7 @@ def test_a_pipe_gets_a_line_now_and_then(
 def test_a_recommendation_is_safe_on_the_axes_drawn_and_says_what_to_expect(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (0.8, 1.0))
+    monkeypatch.setattr("stickslip.recommendation.recommend.GAINS", (0.8, 1.0))
     model = written(tmp_path / "m.toml", 0.03)
     options = [
         "--bandwidth",
@@ -107,9 +107,9 @@ def test_a_torque_limit_below_friction_is_no_safe_axis(
 def test_the_margin_that_is_printed_is_what_the_table_says(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (1.0,))
-    monkeypatch.setattr("stickslip.recommend.recommend.LEADS", (0.0,))
-    monkeypatch.setattr("stickslip.recommend.recommend.BEYOND", (1.5, 2.5))
+    monkeypatch.setattr("stickslip.recommendation.recommend.GAINS", (1.0,))
+    monkeypatch.setattr("stickslip.recommendation.recommend.LEADS", (0.0,))
+    monkeypatch.setattr("stickslip.recommendation.recommend.BEYOND", (1.5, 2.5))
     model = written(tmp_path / "m.toml", law="coulomb")
     assert main(["recommend", str(model), "--bandwidth", "20", "--axes", "1", "--confirm", "0", "--all"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -138,8 +138,8 @@ def test_a_negative_gain_is_not_exported(tmp_path: Path, capsys: pytest.CaptureF
 def test_what_is_recommended_is_exported_and_run_by_the_commands_that_are_printed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (0.9,))
-    monkeypatch.setattr("stickslip.recommend.recommend.LEADS", (0.5,))
+    monkeypatch.setattr("stickslip.recommendation.recommend.GAINS", (0.9,))
+    monkeypatch.setattr("stickslip.recommendation.recommend.LEADS", (0.5,))
     monkeypatch.chdir(tmp_path)
     model, out = written(tmp_path / "m.toml"), tmp_path / "my axis" / "recommended.toml"
     asked = ["recommend", str(model), "--bandwidth", "20", "--axes", "1", "--confirm", "0", "--out"]
@@ -184,7 +184,7 @@ def test_parameters_and_percentages_are_readable() -> None:
 def test_where_the_model_is_unsure_less_is_promised(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (0.8, 1.0))
+    monkeypatch.setattr("stickslip.recommendation.recommend.GAINS", (0.8, 1.0))
     kept: list[float] = []
     for relative in (0.01, 0.15):
         model = written(tmp_path / "m.toml", relative)
@@ -212,13 +212,13 @@ def test_a_recommendation_that_no_longer_holds_is_removed_aloud(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It was gone without a word, and export then knew of no such file."""
-    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (0.8,))
+    monkeypatch.setattr("stickslip.recommendation.recommend.GAINS", (0.8,))
     model, out = written(tmp_path / "m.toml"), tmp_path / "recommended.toml"
     call = ["recommend", str(model), "--amplitude=0.1", "--axes=1", "--confirm=0", f"--out={out}", "--force"]
     assert main([*call, "--bandwidth=20"]) == 0
     assert out.is_file()
     capsys.readouterr()
-    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (0.01,))  # takes nothing away
+    monkeypatch.setattr("stickslip.recommendation.recommend.GAINS", (0.01,))  # takes nothing away
     for said in (
         "nothing is recommended, so the earlier recommendation in it was removed",
         "so it is not written",
@@ -270,8 +270,8 @@ def test_the_loop_that_the_user_has_goes_all_the_way(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A cascade given by its gains: simulated, written, named by the export, run by a rig."""
-    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (0.8,))
-    monkeypatch.setattr("stickslip.recommend.recommend.LEADS", (0.0,))
+    monkeypatch.setattr("stickslip.recommendation.recommend.GAINS", (0.8,))
+    monkeypatch.setattr("stickslip.recommendation.recommend.LEADS", (0.0,))
     model, out = written(tmp_path / "m.toml"), tmp_path / "recommended.toml"
     loop = "kv=30,kvp=0.08,kvi=1.2,feed=0.5,filter=200,limit=3"
     asked = ["recommend", str(model), "--loop", loop, "--axes", "1", "--confirm", "2", "--out", str(out)]
@@ -322,7 +322,7 @@ def test_a_loop_or_motion_that_cannot_be_is_refused(
 def test_a_motion_of_another_log_is_taken(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (0.8,))
+    monkeypatch.setattr("stickslip.recommendation.recommend.GAINS", (0.8,))
     t = np.linspace(0.0, 2.0, 2001)
     lines = [f"{a:.4f},{b:.6f}" for a, b in zip(t, 0.3 - 0.3 * np.cos(np.pi * t), strict=True)]
     log = tmp_path / "cycle.csv"

@@ -21,11 +21,11 @@ from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError, LimitCrossed
-from stickslip.identify.compare.change import compare_models
-from stickslip.identify.estimate import Identification
-from stickslip.identify.identified_file import read_identified
-from stickslip.identify.model_file import write_model
-from stickslip.identify.sliding.segments import constant_velocity_segments
+from stickslip.identification.compare.change import compare_models
+from stickslip.identification.estimate import Identification
+from stickslip.identification.identified_file import read_identified
+from stickslip.identification.model_file import write_model
+from stickslip.identification.steady_friction.segments import constant_velocity_segments
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
@@ -33,9 +33,9 @@ from stickslip.machines.files import load_machine, machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier, Harmonics
 from stickslip.model import Model
-from stickslip.recommend.axes import plants_of
-from stickslip.recommend.notes import notes_on
-from stickslip.recommend.recommendation import Recommendation
+from stickslip.recommendation.axes import plants_of
+from stickslip.recommendation.notes import notes_on
+from stickslip.recommendation.recommendation import Recommendation
 from stickslip.report.identified import Source, write_identification
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.narrower_limits import limited
@@ -44,8 +44,8 @@ from stickslip.rigs.procedures.moves import holder, move
 from stickslip.rigs.procedures.track import RECOMMENDED, Track
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import VirtualRig, virtual_rig
-from stickslip.sweep.numbers import varied
-from stickslip.sweep.plan import load
+from stickslip.sweeps.numbers import varied
+from stickslip.sweeps.plan import load
 
 OTHER = Machine(
     "other",

@@ -9,7 +9,7 @@ import pytest
 
 from stickslip.commission import commission as commissioning
 from stickslip.commission.curve import moving
-from stickslip.identify.presliding.breakaway import identify_breakaway
+from stickslip.identification.presliding.breakaway import identify_breakaway
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine

@@ -9,8 +9,8 @@ import numpy as np
 from stickslip import Model
 from stickslip.commission.headline import headline
 from stickslip.finding import Finding
-from stickslip.identify.estimate import Estimate, Identification
-from stickslip.recommend.candidates import Setting
+from stickslip.identification.estimate import Estimate, Identification
+from stickslip.recommendation.candidates import Setting
 from stickslip.record import Record
 from stickslip.report.identified import Source, write_identification
 

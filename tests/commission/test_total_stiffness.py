@@ -7,7 +7,7 @@ import pytest
 
 from stickslip import Model
 from stickslip.commission.stiffness import resolved, within_total
-from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identification.estimate import Estimate, Identification
 
 LAW = Model("gms", fs=0.3, fc=0.25, vs=0.1, sigma2=0.01, k=[800.0, 400.0], alpha=[0.6, 0.4], c=10.0)
 

@@ -13,11 +13,11 @@ from stickslip.contract.motions import name_of, variants
 from stickslip.control.belief import believed
 from stickslip.control.catalogue import CATALOGUE, LOOPS, compensated
 from stickslip.errors import ParameterError
-from stickslip.export._sliding import Curve
+from stickslip.exports._sliding import Curve
 from stickslip.friction_levels import bends_of, independent, levels_of, static_level
 from stickslip.model import Model
-from stickslip.recommend.candidates import breakaway
-from stickslip.recommend.question import laws_of
+from stickslip.recommendation.candidates import breakaway
+from stickslip.recommendation.question import laws_of
 from stickslip.spec import Surroundings
 
 INERTIA = 4e-4

@@ -9,9 +9,9 @@ import pytest
 import stickslip as ss
 from stickslip.analyse.controller_loop import linearised
 from stickslip.errors import Divergence, InputError, LawError
-from stickslip.study.build import Numerics
-from stickslip.study.planned_run import PlannedRun
-from stickslip.sweep.measured import measured
+from stickslip.studies.build import Numerics
+from stickslip.studies.planned_run import PlannedRun
+from stickslip.sweeps.measured import measured
 
 HEAD = '''"""A law of one's own."""
 import math

@@ -18,8 +18,8 @@ from stickslip.control.plain import plain_sample
 from stickslip.control.recommended import Recommended, read_recommended
 from stickslip.control.written import table_as_given, tables_of
 from stickslip.errors import ConfigError, InputError, ParameterError, UnknownName
-from stickslip.export.controllers import given_by
-from stickslip.identify.methods._experiments import loop_of as identify_loop
+from stickslip.exports.controllers import given_by
+from stickslip.identification.methods._experiments import loop_of as identify_loop
 from stickslip.spec import Surroundings
 from stickslip.verbs.recommend import loop_of, one_of
 

@@ -15,8 +15,8 @@ import stickslip as ss
 from stickslip.machines.contact import Bearings, Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
-from stickslip.recommend.following import follow
-from stickslip.recommend.plant import laid_out
+from stickslip.recommendation.following import follow
+from stickslip.recommendation.plant import laid_out
 from stickslip.simulation.compiled_controller import compiled
 from stickslip.spec import Surroundings
 from support.golden_rows import INERTIA, ROWS

@@ -13,7 +13,7 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.catalogue import compensated
 from stickslip.errors import ParameterError
 from stickslip.machines.files import machine
-from stickslip.study.bench_metrics import judged
+from stickslip.studies.bench_metrics import judged
 
 INERTIA = 3.8623e-4
 BELIEF = Belief(

@@ -9,8 +9,8 @@ from stickslip import plugins
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.export import arduino, arduino_controller, c99
-from stickslip.export.job import Job
+from stickslip.exports import arduino, arduino_controller, c99
+from stickslip.exports.job import Job
 from stickslip.model import Model
 
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.export import linuxcnc
-from stickslip.export.job import Job
+from stickslip.exports import linuxcnc
+from stickslip.exports.job import Job
 from stickslip.plugins import law
 from stickslip.spec import Surroundings
 from support.hal_component import Component

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stickslip.errors import InputError
-from stickslip.export import bam
-from stickslip.export.job import CannotCarry, Job
+from stickslip.exports import bam
+from stickslip.exports.job import CannotCarry, Job
 from stickslip.model import Model
 
 positive = st.floats(1e-6, 1e6)

@@ -15,9 +15,9 @@ from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.errors import InputError
-from stickslip.export import c99, c99_controller
-from stickslip.export.golden import Golden, golden, random_steps, room_beside_jumps
-from stickslip.export.job import Job
+from stickslip.exports import c99, c99_controller
+from stickslip.exports.golden import Golden, golden, random_steps, room_beside_jumps
+from stickslip.exports.job import Job
 from stickslip.jit import call_sample, call_step, compiled_step, flat, kernel, pointer
 from stickslip.laws import LAWS as BUILT_IN
 from stickslip.model import Model

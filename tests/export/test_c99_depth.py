@@ -12,9 +12,9 @@ from stickslip import plugins
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.export import c99, c99_controller
-from stickslip.export.golden import random_steps
-from stickslip.export.job import Job
+from stickslip.exports import c99, c99_controller
+from stickslip.exports.golden import random_steps
+from stickslip.exports.job import Job
 from stickslip.spec import Surroundings
 from support.cortex_m4f import emulated, missing
 from support.laws import farthest, label, registered

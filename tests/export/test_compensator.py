@@ -13,7 +13,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.control.recommended import read_recommended
 from stickslip.errors import ParameterError
-from stickslip.export.job import Check
+from stickslip.exports.job import Check
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.rigs.loop import Loop

@@ -14,10 +14,10 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.registry import control_law, control_law_names
 from stickslip.errors import UnknownName
-from stickslip.export import CONTROLLER_TARGETS, controller_target
-from stickslip.export._fmu_run import played
-from stickslip.export.controllers import golden_samples
-from stickslip.export.st_controller import GIVEN
+from stickslip.exports import CONTROLLER_TARGETS, controller_target
+from stickslip.exports._fmu_run import played
+from stickslip.exports.controllers import golden_samples
+from stickslip.exports.st_controller import GIVEN
 from stickslip.model import Model
 from support.structured_text import Program
 

@@ -14,8 +14,8 @@ from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import ParameterError
-from stickslip.export import controller_target
-from stickslip.export._step_error import step_errors
+from stickslip.exports import controller_target
+from stickslip.exports._step_error import step_errors
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Reference
 from stickslip.rigs.loop_sample import control_of

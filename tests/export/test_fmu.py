@@ -16,9 +16,9 @@ from stickslip import plugins
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.export import target_named
-from stickslip.export.fmu_axis import driven
-from stickslip.export.job import Job
+from stickslip.exports import target_named
+from stickslip.exports.fmu_axis import driven
+from stickslip.exports.job import Job
 from stickslip.jit import compiled_law
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference

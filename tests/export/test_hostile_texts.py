@@ -15,8 +15,8 @@ import pytest
 import yaml
 
 import stickslip as ss
-from stickslip.export import CONTROLLER_TARGETS, TARGETS, target_named
-from stickslip.export.maps import MAP_TARGETS, map_target, written
+from stickslip.exports import CONTROLLER_TARGETS, TARGETS, target_named
+from stickslip.exports.maps import MAP_TARGETS, map_target, written
 from stickslip.machines.position_map import PositionMap, Waves
 from support import matiec
 from support.hostile_texts import BREAKS, SAFE, law_file, own_lines, visible

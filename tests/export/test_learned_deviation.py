@@ -6,7 +6,7 @@ import pytest
 from test_c99 import COMPILERS
 
 from stickslip.control.learned import WIDTH, learned_values
-from stickslip.export.c99_controller import write
+from stickslip.exports.c99_controller import write
 from stickslip.spec import Learned
 from support.golden_rows import ROWS
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from stickslip import plugins
-from stickslip.export import linuxcnc
-from stickslip.export.job import Job
+from stickslip.exports import linuxcnc
+from stickslip.exports.job import Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 from support.hal_component import Component

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from stickslip import plugins
-from stickslip.export import modelica
-from stickslip.export.golden import PACE, golden_around
-from stickslip.export.job import Job
+from stickslip.exports import modelica
+from stickslip.exports.golden import PACE, golden_around
+from stickslip.exports.job import Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 from support.laws import farthest, label, registered

@@ -6,11 +6,11 @@ from hypothesis import strategies as st
 
 from stickslip import plugins
 from stickslip.errors import InputError
-from stickslip.export._mujoco_run import drift, pulled
-from stickslip.export.job import CannotCarry, Job
-from stickslip.export.mujoco import LUGRE as LUGRE_FORM
-from stickslip.export.mujoco import holding_step, read, write, xml
-from stickslip.export.nearest import COULOMB, carried
+from stickslip.exports._mujoco_run import drift, pulled
+from stickslip.exports.job import CannotCarry, Job
+from stickslip.exports.mujoco import LUGRE as LUGRE_FORM
+from stickslip.exports.mujoco import holding_step, read, write, xml
+from stickslip.exports.nearest import COULOMB, carried
 from stickslip.model import Model
 
 INERTIA = 3.8623e-4

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import pytest
 
 import stickslip as ss
-from stickslip.export import TARGETS
+from stickslip.exports import TARGETS
 
 WORDED = ("c99", "arduino", "python", "matlab", "st", "linuxcnc", "modelica")
 """Targets with code."""

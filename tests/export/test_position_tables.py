@@ -16,8 +16,8 @@ import tomli_w
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError, UnknownName
-from stickslip.export.maps import MAP_TARGETS, map_target, written
-from stickslip.export.position_tables import c_table, moteus, odrive, vesc
+from stickslip.exports.maps import MAP_TARGETS, map_target, written
+from stickslip.exports.position_tables import c_table, moteus, odrive, vesc
 from stickslip.machines.position_map import PositionMap, Waves
 from support.hal_component import Component
 from support.lisp import Lisp

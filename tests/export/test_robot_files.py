@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import pytest
 import yaml
 
-from stickslip.export import isaac, ros
-from stickslip.export.job import Job
+from stickslip.exports import isaac, ros
+from stickslip.exports.job import Job
 from stickslip.model import Model
 
 STATIC = Model("static", fs=0.335, fc=0.285, sigma2=0.018)

@@ -9,9 +9,9 @@ import pytest
 from lark.exceptions import UnexpectedInput
 
 from stickslip import plugins
-from stickslip.export import st
-from stickslip.export.golden import PACE, golden_around
-from stickslip.export.job import Job
+from stickslip.exports import st
+from stickslip.exports.golden import PACE, golden_around
+from stickslip.exports.job import Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 from support import matiec

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from stickslip import plugins
-from stickslip.export import _fmu, arduino, c99, fmu, fmu_axis, linuxcnc, matlab, modelica, python, st
-from stickslip.export._step_error import PARTS, step_errors
-from stickslip.export.job import Job
+from stickslip.exports import _fmu, arduino, c99, fmu, fmu_axis, linuxcnc, matlab, modelica, python, st
+from stickslip.exports._step_error import PARTS, step_errors
+from stickslip.exports.job import Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 from support.structured_text import Program

@@ -15,9 +15,9 @@ from stickslip.control import composition
 from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.export import TARGETS, arduino, c99, c99_controller, matlab, modelica, python, st, target_named
-from stickslip.export.golden import answered
-from stickslip.export.job import Export, Job
+from stickslip.exports import TARGETS, arduino, c99, c99_controller, matlab, modelica, python, st, target_named
+from stickslip.exports.golden import answered
+from stickslip.exports.job import Export, Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 from support.laws import farthest

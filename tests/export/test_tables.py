@@ -9,10 +9,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from stickslip.errors import InputError
-from stickslip.export import beckhoff, table
-from stickslip.export._points import between_points
-from stickslip.export.job import CannotCarry, Job
-from stickslip.export.nearest import Curve
+from stickslip.exports import beckhoff, table
+from stickslip.exports._points import between_points
+from stickslip.exports.job import CannotCarry, Job
+from stickslip.exports.nearest import Curve
 from stickslip.model import Model
 
 STRIBECK = Model("stribeck_plain", fs=0.335, fc=0.285, vs=0.01, sigma2=0.018)

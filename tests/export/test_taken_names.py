@@ -6,7 +6,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
-from stickslip.export._sliding import slowest_scale, velocity_scale
+from stickslip.exports._sliding import slowest_scale, velocity_scale
 
 LAW = ss.Model("coulomb", fc=0.3, sigma2=0.02)
 OWN = '''"""Friction with an excess at low velocity."""

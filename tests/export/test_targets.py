@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from stickslip import plugins
-from stickslip.export import TARGETS, target_named
-from stickslip.export.job import CannotCarry, Job
+from stickslip.exports import TARGETS, target_named
+from stickslip.exports.job import CannotCarry, Job
 from stickslip.model import Model
 from support.laws import farthest, label, registered
 

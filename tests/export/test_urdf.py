@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stickslip.errors import InputError
-from stickslip.export import urdf
-from stickslip.export.job import Job
+from stickslip.exports import urdf
+from stickslip.exports.job import Job
 from stickslip.model import Model
 
 number = st.floats(0.0, 1e6, allow_subnormal=False)

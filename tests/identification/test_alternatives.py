@@ -15,7 +15,7 @@ from stickslip.identification.alternatives.cogging import order_of
 from stickslip.identification.alternatives.load import registry_for
 from stickslip.identification.rows import SlidingRows, sliding_rows
 from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from support import analytic_records as analytic
 

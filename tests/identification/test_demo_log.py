@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import stickslip as ss
-from stickslip.identify.estimate import Identification
+from stickslip.identification.estimate import Identification
 
 TRUTH = {"inertia": 4e-4, "fs": 0.335, "fc": 0.285, "vs": 0.1, "sigma2": 0.018, "offset": 0.03}
 

@@ -12,7 +12,7 @@ import pytest
 
 from stickslip.identification.search import Asked
 from stickslip.identification.sliding import Number, SlidingPosterior, estimate_sliding
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 
 AXIS = ServoAxis(drive_side="load")

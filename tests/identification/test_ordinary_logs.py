@@ -15,7 +15,7 @@ from stickslip.errors import InputError
 from stickslip.identification.axis import identify_axis
 from stickslip.identification.search import Asked
 from stickslip.identification.sliding import estimate_sliding
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 
 AXIS = ServoAxis(drive_side="load")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from stickslip.identification.axis import FALLS, identify_axis
-from stickslip.identify.estimate import Identification
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.estimate import Identification
+from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from support.analytic_records import FC_BACK, TRUTH, record
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.identify.sliding.position_dependence import identify_angle
+from stickslip.identification.steady_friction.position_dependence import identify_angle
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.files import machine
 from stickslip.machines.motor import Harmonics

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.identify.doctor import examine
-from stickslip.identify.doctor.play import backlash, dead_travel
-from stickslip.identify.doctor.view import View
+from stickslip.identification.doctor import examine
+from stickslip.identification.doctor.play import backlash, dead_travel
+from stickslip.identification.doctor.view import View
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, drive_axis

@@ -5,7 +5,7 @@ import pytest
 
 from stickslip import Model, Record
 from stickslip.errors import InputError
-from stickslip.identify.presliding.breakaway import find_breaks, identify_breakaway, mean_estimate
+from stickslip.identification.presliding.breakaway import find_breaks, identify_breakaway, mean_estimate
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 

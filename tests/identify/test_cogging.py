@@ -11,11 +11,11 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError, UnknownName
-from stickslip.export.maps import map_target, written
-from stickslip.identify.cogging import identify_cogging
-from stickslip.identify.cogging.moving import speed_control
-from stickslip.identify.methods import method_named
-from stickslip.identify.methods.method import Options
+from stickslip.exports.maps import map_target, written
+from stickslip.identification.cogging import identify_cogging
+from stickslip.identification.cogging.moving import speed_control
+from stickslip.identification.methods import method_named
+from stickslip.identification.methods.method import Options
 from stickslip.machines.files import machine
 from stickslip.machines.position_map import PositionMap, Waves
 from stickslip.record import Record

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from stickslip.identify.cogging import identify_cogging
-from stickslip.identify.cogging.noise import Noise, density_of, excess, widened
-from stickslip.identify.cogging.rows import Places
+from stickslip.identification.cogging import identify_cogging
+from stickslip.identification.cogging.noise import Noise, density_of, excess, widened
+from stickslip.identification.cogging.rows import Places
 from stickslip.record import Record
 
 TURN = 2.0 * np.pi

@@ -11,14 +11,14 @@ from scipy import optimize, stats
 
 from stickslip import Model, Par, law, law_names
 from stickslip.errors import InputError, UnknownName
-from stickslip.identify.estimate import Identification
-from stickslip.identify.fit.broyden import descend_by_secants
-from stickslip.identify.fit.levenberg_marquardt import Squares, central_differences, descend
-from stickslip.identify.fit.noise import Noise, noise_of_repeats
-from stickslip.identify.fit.parameter_vector import Parameter, Vector
-from stickslip.identify.fit.profile import profiles_of
-from stickslip.identify.fit.selection import criteria, cross_validate
-from stickslip.identify.fit.uncertainty import fit
+from stickslip.identification.estimate import Identification
+from stickslip.identification.fit.broyden import descend_by_secants
+from stickslip.identification.fit.levenberg_marquardt import Squares, central_differences, descend
+from stickslip.identification.fit.noise import Noise, noise_of_repeats
+from stickslip.identification.fit.parameter_vector import Parameter, Vector
+from stickslip.identification.fit.profile import profiles_of
+from stickslip.identification.fit.selection import criteria, cross_validate
+from stickslip.identification.fit.uncertainty import fit
 from stickslip.simulation.prescribed.steady import Steady
 
 ANY = Par("-", "x", "a number")

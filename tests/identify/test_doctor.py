@@ -13,7 +13,7 @@ import stickslip
 from stickslip import Controller, Model, Record, Reference, RigidAxis, place, simulate
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.identify.doctor import ERRORS, examine
+from stickslip.identification.doctor import ERRORS, examine
 from stickslip.readers import Drive, read
 from stickslip.readers.cut import Cut, cut
 from support.doctor_logs import (

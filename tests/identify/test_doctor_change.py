@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from stickslip import Record
-from stickslip.identify.doctor import examine
-from stickslip.identify.doctor.change import other_motion
+from stickslip.identification.doctor import examine
+from stickslip.identification.doctor.change import other_motion
 
 SWITCH = 0.43
 COUNT = 2.0 * np.pi / 2**18

@@ -9,7 +9,7 @@ import pytest
 
 import stickslip as ss
 from stickslip import Record
-from stickslip.identify.doctor import examine
+from stickslip.identification.doctor import examine
 
 UNITS = {"position": "rad", "motor_torque": "N·m"}
 

@@ -10,7 +10,7 @@ import pytest
 import stickslip as ss
 from stickslip import Record
 from stickslip.errors import InputError
-from stickslip.identify.doctor import examine
+from stickslip.identification.doctor import examine
 
 J, FC, COUNTS, RATED = 1e-3, 0.3, 8192, 1.3
 UNITS = {"position": "rad", "motor_torque": "N·m"}

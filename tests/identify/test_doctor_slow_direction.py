@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.identify.doctor import examine
+from stickslip.identification.doctor import examine
 from stickslip.record import Record, encoder_step
 
 PERIOD = 0.002

@@ -11,8 +11,8 @@ import pytest
 
 from stickslip import Record
 from stickslip.cli import main
-from stickslip.identify.doctor import examine
-from stickslip.identify.doctor.spikes import spike_rows
+from stickslip.identification.doctor import examine
+from stickslip.identification.doctor.spikes import spike_rows
 
 FC, J, SIZE = 2.0, 0.01, 20_000
 UNITS = {"position": "rad", "motor_torque": "N·m"}

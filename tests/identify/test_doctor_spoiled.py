@@ -11,8 +11,8 @@ import pytest
 import stickslip as ss
 from stickslip import Record
 from stickslip.cli import main
-from stickslip.identify.doctor import examine
-from stickslip.identify.doctor.units import _binary_counts
+from stickslip.identification.doctor import examine
+from stickslip.identification.doctor.units import _binary_counts
 from stickslip.readers import read
 from support.doctor_logs import (
     DEG,

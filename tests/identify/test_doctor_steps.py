@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.identify.doctor import examine
+from stickslip.identification.doctor import examine
 from stickslip.record import Record
 
 INERTIA, LEVEL = 2e-2, 0.1

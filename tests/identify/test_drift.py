@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.identify.compare.change import compare_models
-from stickslip.identify.compare.motor_or_load import on_one_side
-from stickslip.identify.estimate import Estimate
-from stickslip.identify.identified_file import Identified
+from stickslip.identification.compare.change import compare_models
+from stickslip.identification.compare.motor_or_load import on_one_side
+from stickslip.identification.estimate import Estimate
+from stickslip.identification.identified_file import Identified
 from stickslip.model import Model
 
 UNITS = {"fs": "N·m", "fc": "N·m", "vs": "rad/s", "sigma2": "N·m·s/rad", "k": "N·m·s/rad", "inertia": "kg·m²"}

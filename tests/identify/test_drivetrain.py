@@ -11,8 +11,8 @@ from stickslip.analyse.tracking import tracking_metrics
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.errors import InputError
-from stickslip.identify.response.drivetrain import fit_drivetrain, identified_drivetrain, loop_response
-from stickslip.identify.response.nyquist import fastest_pd
+from stickslip.identification.response.drivetrain import fit_drivetrain, identified_drivetrain, loop_response
+from stickslip.identification.response.nyquist import fastest_pd
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.files import machine

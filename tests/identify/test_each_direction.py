@@ -11,15 +11,15 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.identification.axis import identify_axis
-from stickslip.identify.axis.plain import inverse_identification
-from stickslip.identify.estimate import Identification
-from stickslip.identify.evidence import extrapolated
-from stickslip.identify.experiment import Experiment
-from stickslip.identify.fit.parameter_vector import Vector
-from stickslip.identify.identified_file import read_identified
-from stickslip.identify.model_file import write_model
-from stickslip.identify.monte_carlo import draw_models
-from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identification.output_error.plain import inverse_identification
+from stickslip.identification.estimate import Identification
+from stickslip.identification.evidence import extrapolated
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.fit.parameter_vector import Vector
+from stickslip.identification.identified_file import read_identified
+from stickslip.identification.model_file import write_model
+from stickslip.identification.monte_carlo import draw_models
+from stickslip.identification.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from support import axis_cases as cases

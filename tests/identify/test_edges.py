@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip.identify.observer.encoder_edges import REST, seen_velocity
+from stickslip.identification.observer.encoder_edges import REST, seen_velocity
 
 DT = 1e-3
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import linalg, signal
 
 from stickslip.errors import InputError
-from stickslip.identify.fit.filters import (
+from stickslip.identification.fit.filters import (
     RIPPLE,
     ZeroPhase,
     butterworth_poles,
@@ -18,8 +18,8 @@ from stickslip.identify.fit.filters import (
     low_pass,
     spectrum,
 )
-from stickslip.identify.fit.parallel import mapped
-from stickslip.identify.observer.innovations import durbin
+from stickslip.identification.fit.parallel import mapped
+from stickslip.identification.observer.innovations import durbin
 
 
 def wandering(n: int, seed: int):

@@ -9,9 +9,9 @@ import pytest
 
 from stickslip import Model
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.experiment import Experiment
-from stickslip.identify.response.inertia import frequency_response, inertia, verdict_on
+from stickslip.identification.estimate import Estimate, Identification
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.response.inertia import frequency_response, inertia, verdict_on
 from stickslip.machines.servo import ServoAxis
 from stickslip.report.answers import answers_of
 from stickslip.report.identified import shown

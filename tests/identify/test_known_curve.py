@@ -13,7 +13,7 @@ import stickslip as ss
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, plugins, simulate
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.identify.presliding.known_curve import describe_unused, static_levels, transfer_curve
+from stickslip.identification.presliding.known_curve import describe_unused, static_levels, transfer_curve
 from stickslip.simulation.prescribed.motion import Along
 
 INERTIA = 4.2757e-4

@@ -7,8 +7,8 @@ import pytest
 
 from stickslip import Controller, Gains, Model, Reference, RigidAxis, simulate
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Identification
-from stickslip.identify.presliding.lugre_dynamics import Response, fit_position, identify_lugre_dynamics
+from stickslip.identification.estimate import Identification
+from stickslip.identification.presliding.lugre_dynamics import Response, fit_position, identify_lugre_dynamics
 
 INERTIA = 3.8623e-4
 SLIDING = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}

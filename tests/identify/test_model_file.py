@@ -9,8 +9,8 @@ import pytest
 
 from stickslip import plugins
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.model_file import write_model
+from stickslip.identification.estimate import Estimate, Identification
+from stickslip.identification.model_file import write_model
 from stickslip.model import Model
 
 LAWS = [plugins.law(name) for name in plugins.law_names()]

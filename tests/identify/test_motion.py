@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.errors import InputError
-from stickslip.identify.motion import HOLD, LONGEST, Motion, motion_in, motion_of, sinusoid, speeds_of
+from stickslip.identification.motion import HOLD, LONGEST, Motion, motion_in, motion_of, sinusoid, speeds_of
 from stickslip.record import Record
 
 T = 1e-3

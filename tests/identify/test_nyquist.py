@@ -13,8 +13,8 @@ from scipy import signal
 
 from stickslip.control.linear import place
 from stickslip.errors import InputError
-from stickslip.identify.response.drivetrain import LoopResponse
-from stickslip.identify.response.nyquist import encirclements, fastest_pd
+from stickslip.identification.response.drivetrain import LoopResponse
+from stickslip.identification.response.nyquist import encirclements, fastest_pd
 
 DT = 1e-3
 
@@ -69,7 +69,7 @@ def test_the_count_is_half_the_unstable_poles(load, mode, damping, delay, held, 
 
 def locus(points, bandwidth=10.0):
     """A response whose locus under that PD is a polygon through the points, 1 Hz apart from 5 Hz on."""
-    from stickslip.identify.response.nyquist import pd_response
+    from stickslip.identification.response.nyquist import pd_response
 
     f = 5.0 + np.arange(len(points))
     return LoopResponse(

@@ -7,8 +7,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
-from stickslip.identify.fit.multistart import separable_starts
-from stickslip.identify.fit.parameter_vector import Vector
+from stickslip.identification.fit.multistart import separable_starts
+from stickslip.identification.fit.parameter_vector import Vector
 
 T = np.arange(2000) * 1e-3
 MOVES = 0.3 * np.sin(2.0 * np.pi * T)

@@ -9,19 +9,19 @@ import pytest
 from stickslip import Model, Reference, respond
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.identify.presliding.attraction import (
+from stickslip.identification.presliding.attraction import (
     OVERSHOOT,
     apply_overshoot_rule,
     identify_attraction,
     response_to_velocity,
 )
-from stickslip.identify.presliding.hysteresis import (
+from stickslip.identification.presliding.hysteresis import (
     Loop,
     choose_hysteresis,
     identify_hysteresis,
     templates_for,
 )
-from stickslip.identify.presliding.presliding import cycles, identify_presliding
+from stickslip.identification.presliding.presliding import cycles, identify_presliding
 from stickslip.machines.files import machine
 from stickslip.report.identification import draw_picture_to
 from stickslip.rigs.procedures.base import perform

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from stickslip.errors import InputError, UnknownName
-from stickslip.identify.methods import METHODS, method_named
-from stickslip.identify.methods._records import known_curve
-from stickslip.identify.methods.method import Options
-from stickslip.identify.methods.sliding import refuse_unknown
+from stickslip.identification.methods import METHODS, method_named
+from stickslip.identification.methods._records import known_curve
+from stickslip.identification.methods.method import Options
+from stickslip.identification.methods.sliding import refuse_unknown
 from stickslip.model import Model
 
 OWN = ("axis", "cogging", "sliding", "presliding", "lugre")

@@ -11,11 +11,11 @@ import pytest
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Identification
-from stickslip.identify.sliding.choice import candidates, choose_sliding
-from stickslip.identify.sliding.curve import identify_sliding
-from stickslip.identify.sliding.points import SlidingPoints
-from stickslip.identify.sliding.segments import constant_velocity_segments, sliding_points
+from stickslip.identification.estimate import Identification
+from stickslip.identification.steady_friction.choice import candidates, choose_sliding
+from stickslip.identification.steady_friction.curve import identify_sliding
+from stickslip.identification.steady_friction.points import SlidingPoints
+from stickslip.identification.steady_friction.segments import constant_velocity_segments, sliding_points
 from stickslip.report.identification import draw_picture_to
 from support.places import REFERENCE, needs_reference
 

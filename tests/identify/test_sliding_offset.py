@@ -9,9 +9,9 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
-from stickslip.identify.model_file import model_data
-from stickslip.identify.sliding.curve import identify_sliding
-from stickslip.identify.sliding.points import SlidingPoints
+from stickslip.identification.model_file import model_data
+from stickslip.identification.steady_friction.curve import identify_sliding
+from stickslip.identification.steady_friction.points import SlidingPoints
 
 LAW = ss.Model("stribeck_plain", fs=0.335, fc=0.285, vs=0.05, delta_s=2.0, sigma2=0.018)
 COULOMB = ss.Model("coulomb", fc=0.2, sigma2=0.01)

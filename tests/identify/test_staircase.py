@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from stickslip import Model, Record
-from stickslip.identify.estimate import Identification
-from stickslip.identify.fit.multistart import bounded_solution
-from stickslip.identify.sliding.curve import identify_sliding
-from stickslip.identify.sliding.points import SlidingPoints
-from stickslip.identify.sliding.segments import segments_of, sliding_points
+from stickslip.identification.estimate import Identification
+from stickslip.identification.fit.multistart import bounded_solution
+from stickslip.identification.steady_friction.curve import identify_sliding
+from stickslip.identification.steady_friction.points import SlidingPoints
+from stickslip.identification.steady_friction.segments import segments_of, sliding_points
 
 DEGREES = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 TRUTH = {"fs": 1.2, "fc": 1.0, "vs": 0.1, "delta_s": 2.0, "sigma2": 0.35}

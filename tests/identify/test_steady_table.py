@@ -13,8 +13,8 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.identify.fit.multistart import separable_starts
-from stickslip.identify.fit.parameter_vector import Vector
+from stickslip.identification.fit.multistart import separable_starts
+from stickslip.identification.fit.parameter_vector import Vector
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TRUTH = {"fc": 0.4, "fs": 0.55, "vs": 0.15, "sigma2": 0.08, "offset": 0.01}

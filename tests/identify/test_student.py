@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import special
 
-from stickslip.identify.fit.student import student_quantile
+from stickslip.identification.fit.student import student_quantile
 
 
 @given(freedom=st.floats(0.5, 1e5), probability=st.floats(0.55, 0.999))

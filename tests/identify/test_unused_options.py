@@ -11,7 +11,7 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.identify.methods import METHODS, method_named
+from stickslip.identification.methods import METHODS, method_named
 
 GIVEN: dict[str, tuple[dict[str, Any], list[str]]] = {
     "laws": ({"law": "coulomb"}, ["--law", "coulomb"]),

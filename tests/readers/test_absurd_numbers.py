@@ -10,7 +10,7 @@ import pytest
 
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.identify.doctor import examine
+from stickslip.identification.doctor import examine
 from stickslip.readers import read
 from stickslip.record import Record
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.identify.axis.loop_check import doubted_loops
-from stickslip.identify.axis.output import output_error
-from stickslip.identify.experiment import Experiment
-from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identification.output_error.loop_check import doubted_loops
+from stickslip.identification.output_error.output import output_error
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.plugins import law
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal

@@ -7,10 +7,10 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.identification.sliding import estimate_sliding
-from stickslip.identify.axis.over_angle import over_angle
-from stickslip.identify.cogging import identify_cogging
-from stickslip.identify.cogging.moving import in_motion
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.output_error.over_angle import over_angle
+from stickslip.identification.cogging import identify_cogging
+from stickslip.identification.cogging.moving import in_motion
+from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record
 from support import places

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from test_recommend_reasons import drive_of
 
-from stickslip.identify.motion import HOLD, Motion
+from stickslip.identification.motion import HOLD, Motion
 from stickslip.machines.rigid import RigidAxis
 from stickslip.messages import render
 from stickslip.model import Model
-from stickslip.recommend.candidate_run import Drive, Trial, run
-from stickslip.recommend.candidates import Bench, Candidate, Setting
-from stickslip.recommend.course import course_of
-from stickslip.recommend.motion_notes import on_motion
-from stickslip.recommend.plant import Plant
-from stickslip.recommend.recommendation import Recommendation
+from stickslip.recommendation.candidate_run import Drive, Trial, run
+from stickslip.recommendation.candidates import Bench, Candidate, Setting
+from stickslip.recommendation.course import course_of
+from stickslip.recommendation.motion_notes import on_motion
+from stickslip.recommendation.plant import Plant
+from stickslip.recommendation.recommendation import Recommendation
 from stickslip.report.recommendation_text import reduction
 from stickslip.verbs.motion_given import motion_in
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from test_inertia_alone import FAST, identified
 
-from stickslip.recommend import recommend as recommending
-from stickslip.recommend.candidate_run import Drive
-from stickslip.recommend.candidates import Bench, Candidate, Moved, Setting
-from stickslip.recommend.recommend import ALIKE, LEADS, best_of, find_best, recommend, with_lead
+from stickslip.recommendation import recommend as recommending
+from stickslip.recommendation.candidate_run import Drive
+from stickslip.recommendation.candidates import Bench, Candidate, Moved, Setting
+from stickslip.recommendation.recommend import ALIKE, LEADS, best_of, find_best, recommend, with_lead
 from stickslip.verbs.recommendation import RecommendationResult
 
 DRIVE = Drive(sample_time=1e-3)

@@ -12,13 +12,13 @@ import stickslip as ss
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.recommended import read_recommended
-from stickslip.identify.estimate import Estimate
-from stickslip.identify.identified_file import Identified
+from stickslip.identification.estimate import Estimate
+from stickslip.identification.identified_file import Identified
 from stickslip.model import Model
-from stickslip.recommend import recommend as recommending
-from stickslip.recommend.candidate_run import Drive
-from stickslip.recommend.candidates import Candidate, Setting
-from stickslip.recommend.recommend import adds, recommend
+from stickslip.recommendation import recommend as recommending
+from stickslip.recommendation.candidate_run import Drive
+from stickslip.recommendation.candidates import Candidate, Setting
+from stickslip.recommendation.recommend import adds, recommend
 from stickslip.verbs.recommendation import RecommendationResult
 
 INERTIA = 4e-4

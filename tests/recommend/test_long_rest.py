@@ -12,13 +12,13 @@ from test_recommend_axes import estimate
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pid
-from stickslip.identify.identified_file import Identified
+from stickslip.identification.identified_file import Identified
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.recommend import long_rest
-from stickslip.recommend import recommend as recommending
-from stickslip.recommend.long_rest import HUNTS, hunts_with, integrates, unsure_at_rest
-from stickslip.recommend.recommend import Drive, recommend
+from stickslip.recommendation import long_rest
+from stickslip.recommendation import recommend as recommending
+from stickslip.recommendation.long_rest import HUNTS, hunts_with, integrates, unsure_at_rest
+from stickslip.recommendation.recommend import Drive, recommend
 from stickslip.simulation.closed_loop import simulate
 
 INERTIA, COUNTS = 4e-3, 2.0**20

@@ -11,7 +11,7 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.identify.motion import Motion
+from stickslip.identification.motion import Motion
 from stickslip.readers import profiles
 from stickslip.readers.convert import Drive
 from stickslip.readers.reading import open_table
@@ -107,7 +107,7 @@ def test_the_saved_profile_is_used_and_named(tmp_path: Path, monkeypatch: pytest
 def test_the_verb_and_the_command_read_alike(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (0.8,))
+    monkeypatch.setattr("stickslip.recommendation.recommend.GAINS", (0.8,))
     monkeypatch.setenv("STICKSLIP_CONFIG", str(tmp_path / "config"))
     file = log(tmp_path / "log.csv", "t,q,torque_percent", TIME, in_counts(), 50 * SLOPE)
     model = written(tmp_path / "model.toml")

@@ -16,10 +16,10 @@ from stickslip.control.files import read_controller
 from stickslip.control.linear import Gains
 from stickslip.control.written import tables_of
 from stickslip.errors import InputError, UnknownName
-from stickslip.recommend import recommend as recommending
-from stickslip.recommend.beside import Beside, Own, belief_of, fed
-from stickslip.recommend.file import write_setting
-from stickslip.recommend.recommend import Drive, recommend
+from stickslip.recommendation import recommend as recommending
+from stickslip.recommendation.beside import Beside, Own, belief_of, fed
+from stickslip.recommendation.file import write_setting
+from stickslip.recommendation.recommend import Drive, recommend
 from stickslip.report.recommendation_text import beside_lines
 from stickslip.verbs.candidates_given import compensators_of, made_for
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from stickslip.control.linear import Cascade
-from stickslip.identify.motion import motion_of
+from stickslip.identification.motion import motion_of
 from stickslip.model import Model
-from stickslip.recommend.candidate_run import Drive
-from stickslip.recommend.candidates import AFTER_A_PUSH, Bench, Candidate, Setting
-from stickslip.recommend.plant import Plant
-from stickslip.recommend.pushed import PUSHED, pushes
+from stickslip.recommendation.candidate_run import Drive
+from stickslip.recommendation.candidates import AFTER_A_PUSH, Bench, Candidate, Setting
+from stickslip.recommendation.plant import Plant
+from stickslip.recommendation.pushed import PUSHED, pushes
 from stickslip.record import Record
 
 INERTIA = 2.378e-3

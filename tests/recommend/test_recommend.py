@@ -14,17 +14,17 @@ from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import InputError, ParameterError
-from stickslip.identify.estimate import Estimate
-from stickslip.identify.identified_file import Identified
-from stickslip.identify.motion import sinusoid
+from stickslip.identification.estimate import Estimate
+from stickslip.identification.identified_file import Identified
+from stickslip.identification.motion import sinusoid
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.recommend import recommend as recommending
-from stickslip.recommend.axes import plants_of
-from stickslip.recommend.candidate_run import Plant, dangers, run
-from stickslip.recommend.candidates import rings_alone
-from stickslip.recommend.recommend import Drive, Setting, recommend
-from stickslip.recommend.refusals import refuse_weak
+from stickslip.recommendation import recommend as recommending
+from stickslip.recommendation.axes import plants_of
+from stickslip.recommendation.candidate_run import Plant, dangers, run
+from stickslip.recommendation.candidates import rings_alone
+from stickslip.recommendation.recommend import Drive, Setting, recommend
+from stickslip.recommendation.refusals import refuse_weak
 from stickslip.report.recommendation_text import recommendation_lines
 from stickslip.simulation.closed_loop import simulate
 from stickslip.spec import Surroundings
@@ -94,7 +94,7 @@ def test_a_setting_that_is_unsafe_on_an_axis_drawn_later_gives_way(monkeypatch: 
         ) else out  # fmt: skip
 
     monkeypatch.setattr(recommending.Bench, "judged", failing)
-    monkeypatch.setattr("stickslip.recommend.axes._with_springs", lambda model, *_: model)
+    monkeypatch.setattr("stickslip.recommendation.axes._with_springs", lambda model, *_: model)
     monkeypatch.setattr(recommending, "GAINS", (0.5,))
     advice = recommend(identified(0.02), Drive(20.0, amplitude=0.1), axes=1, confirm=2)
     assert advice.chosen
@@ -313,7 +313,7 @@ def test_every_rigid_contact_of_a_prompt_drive_rings_about_a_coarse_count_and_no
     springs: bool, ringing: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not springs:
-        monkeypatch.setattr("stickslip.recommend.axes._with_springs", lambda model, *_: model)
+        monkeypatch.setattr("stickslip.recommendation.axes._with_springs", lambda model, *_: model)
     drive = Drive(20.0, amplitude=0.1, encoder_counts=4096.0, torque_limit=3.0)
     plants = list(plants_of(identified(0.03), INERTIA, 6, 1))
     linear = Controller(place("PD", INERTIA, 20.0, drive.damping), None, 3.0, drive.sample_time, 4096.0)

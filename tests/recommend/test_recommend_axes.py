@@ -13,16 +13,16 @@ import pytest
 
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Estimate
-from stickslip.identify.identified_file import Identified
+from stickslip.identification.estimate import Estimate
+from stickslip.identification.identified_file import Identified
 from stickslip.model import Model
-from stickslip.recommend import recommend as recommending
-from stickslip.recommend.axes import MOST_STATIC, plants_of
-from stickslip.recommend.candidate_run import Plant, run
-from stickslip.recommend.candidates import Bench, lost
-from stickslip.recommend.notes import notes_on
-from stickslip.recommend.recommend import Drive, recommend
-from stickslip.recommend.recommendation import Recommendation
+from stickslip.recommendation import recommend as recommending
+from stickslip.recommendation.axes import MOST_STATIC, plants_of
+from stickslip.recommendation.candidate_run import Plant, run
+from stickslip.recommendation.candidates import Bench, lost
+from stickslip.recommendation.notes import notes_on
+from stickslip.recommendation.recommend import Drive, recommend
+from stickslip.recommendation.recommendation import Recommendation
 
 INERTIA = 4e-4
 LEVEL = {"fc": 0.285, "sigma2": 0.018}

@@ -18,22 +18,22 @@ from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.linear import Gains
 from stickslip.errors import InputError, ParameterError, UnknownName
-from stickslip.identify.identified_file import Identified
+from stickslip.identification.identified_file import Identified
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
-from stickslip.recommend import beside, long_rest
-from stickslip.recommend import recommend as recommending
-from stickslip.recommend.beside import belief_of, tried_beside
-from stickslip.recommend.file import write_setting
-from stickslip.recommend.recommend import Drive, recommend
-from stickslip.recommend.swings import between_counts
+from stickslip.recommendation import beside, long_rest
+from stickslip.recommendation import recommend as recommending
+from stickslip.recommendation.beside import belief_of, tried_beside
+from stickslip.recommendation.file import write_setting
+from stickslip.recommendation.recommend import Drive, recommend
+from stickslip.recommendation.swings import between_counts
 from stickslip.report.recommendation_text import beside_lines, instead_lines, recommendation_lines
 from stickslip.simulation.closed_loop import simulate
-from stickslip.study.bench_decision import CHATTER
-from stickslip.study.bench_metrics import judged
+from stickslip.studies.bench_decision import CHATTER
+from stickslip.studies.bench_metrics import judged
 from stickslip.verbs.candidates_given import compensators_of
 from stickslip.verbs.recommend import recommend as recommend_verb
 

@@ -22,10 +22,10 @@ from stickslip.control.recommended import read_recommended
 from stickslip.control.written import tables_of
 from stickslip.errors import ParameterError
 from stickslip.model import Model
-from stickslip.recommend import recommend as recommending
-from stickslip.recommend.candidates import Setting
-from stickslip.recommend.recommend import Drive, recommend
-from stickslip.recommend.sample_time import hardly_damped
+from stickslip.recommendation import recommend as recommending
+from stickslip.recommendation.candidates import Setting
+from stickslip.recommendation.recommend import Drive, recommend
+from stickslip.recommendation.sample_time import hardly_damped
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.virtual import virtual_rig
 from stickslip.verbs.recommend import drive_with, refuse_beside
@@ -273,5 +273,5 @@ def test_a_loop_of_control_laws_is_doubted_at_rows_too_rare_for_it(period, hardl
     def bent(*_):
         raise ss.InputError("controller: loop is not smooth about rest")
 
-    monkeypatch.setattr("stickslip.recommend.sample_time.linearised", bent)
+    monkeypatch.setattr("stickslip.recommendation.sample_time.linearised", bent)
     assert not hardly_damped(loop, period, INERTIA)

@@ -14,10 +14,10 @@ from test_recommend_composed import MODEL
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.recommend.axes import plants_of
-from stickslip.recommend.following import simulated
-from stickslip.recommend.plant import Plant
-from stickslip.recommend.recommend import Drive, recommend
+from stickslip.recommendation.axes import plants_of
+from stickslip.recommendation.following import simulated
+from stickslip.recommendation.plant import Plant
+from stickslip.recommendation.recommend import Drive, recommend
 
 QUICK = {"amplitude": 0.2, "axes": 2, "confirm": 3}
 

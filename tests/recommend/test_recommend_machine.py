@@ -23,13 +23,13 @@ from stickslip.machines.files import machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.model import Model
-from stickslip.recommend import recommend as recommending
-from stickslip.recommend.axes import plants_of
-from stickslip.recommend.candidate_run import rings, run
-from stickslip.recommend.candidates import Setting
-from stickslip.recommend.following import simulated
-from stickslip.recommend.plant import Plant, WholeMachine
-from stickslip.recommend.recommend import Drive, recommend, recommend_on
+from stickslip.recommendation import recommend as recommending
+from stickslip.recommendation.axes import plants_of
+from stickslip.recommendation.candidate_run import rings, run
+from stickslip.recommendation.candidates import Setting
+from stickslip.recommendation.following import simulated
+from stickslip.recommendation.plant import Plant, WholeMachine
+from stickslip.recommendation.recommend import Drive, recommend, recommend_on
 
 LUGRE = Model("lugre", sigma0=3.5e4, sigma1=3.0, sigma2=0.018, fs=0.335, fc=0.285, vs=0.01)
 DRY = machine("thesis-dry")

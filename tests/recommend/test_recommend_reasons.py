@@ -11,18 +11,18 @@ import pytest
 
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Estimate
-from stickslip.identify.identified_file import Identified
-from stickslip.identify.motion import sinusoid
+from stickslip.identification.estimate import Estimate
+from stickslip.identification.identified_file import Identified
+from stickslip.identification.motion import sinusoid
 from stickslip.machines.rigid import RigidAxis
 from stickslip.messages import render
 from stickslip.model import Model
-from stickslip.recommend.candidate_run import Drive, run
-from stickslip.recommend.candidates import Bench, rings_alone
-from stickslip.recommend.notes import lag_of, sampled_as
-from stickslip.recommend.refusals import held
-from stickslip.recommend.ringing import within_counts
-from stickslip.recommend.sample_time import refuse_filter, sample_time_for
+from stickslip.recommendation.candidate_run import Drive, run
+from stickslip.recommendation.candidates import Bench, rings_alone
+from stickslip.recommendation.notes import lag_of, sampled_as
+from stickslip.recommendation.refusals import held
+from stickslip.recommendation.ringing import within_counts
+from stickslip.recommendation.sample_time import refuse_filter, sample_time_for
 
 INERTIA = 4e-4
 COULOMB = Model("coulomb", fc=0.05, sigma2=1e-3)
@@ -112,8 +112,8 @@ def test_a_swing_wider_than_counts_is_the_integrals_and_no_finer_encoder_is_aske
     swing: float, own: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plant = RigidAxis(INERTIA, COULOMB)
-    monkeypatch.setattr("stickslip.recommend.candidates.rings", lambda *_: "at rest")
-    monkeypatch.setattr("stickslip.recommend.candidates.swing_at_rest", lambda *_: swing)
+    monkeypatch.setattr("stickslip.recommendation.candidates.rings", lambda *_: "at rest")
+    monkeypatch.setattr("stickslip.recommendation.candidates.swing_at_rest", lambda *_: swing)
     drive = Drive(gains=Gains(1.0, 8.0, 0.15, 0.15), amplitude=0.1, encoder_counts=65536.0)
     said = rings_alone(Bench([plant], drive.loop(INERTIA), drive, {}), INERTIA, "N·m")
     assert f"by up to {swing:.2g} rad peak to peak" in said

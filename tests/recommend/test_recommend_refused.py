@@ -12,19 +12,19 @@ from test_inertia_alone import identified
 
 from stickslip.control.linear import Cascade
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Estimate
-from stickslip.identify.identified_file import Identified
+from stickslip.identification.estimate import Estimate
+from stickslip.identification.identified_file import Identified
 from stickslip.messages import render
 from stickslip.model import Model
-from stickslip.recommend import recommend as recommending
-from stickslip.recommend.axes import plants_of
-from stickslip.recommend.candidate_run import Drive
-from stickslip.recommend.candidates import Candidate, Setting
-from stickslip.recommend.motion_notes import by_attribute
-from stickslip.recommend.notes import notes_on
-from stickslip.recommend.recommend import recommend
-from stickslip.recommend.recommendation import Recommendation
-from stickslip.recommend.separation import separate
+from stickslip.recommendation import recommend as recommending
+from stickslip.recommendation.axes import plants_of
+from stickslip.recommendation.candidate_run import Drive
+from stickslip.recommendation.candidates import Candidate, Setting
+from stickslip.recommendation.motion_notes import by_attribute
+from stickslip.recommendation.notes import notes_on
+from stickslip.recommendation.recommend import recommend
+from stickslip.recommendation.recommendation import Recommendation
+from stickslip.recommendation.separation import separate
 from stickslip.verbs.recommendation import RecommendationResult
 
 INERTIA = 4e-4

@@ -18,9 +18,9 @@ from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
 from stickslip.messages import render
 from stickslip.model import Model
-from stickslip.recommend import recommend as recommending
-from stickslip.recommend.recommend import Drive
-from stickslip.recommend.resolution import encoder_for
+from stickslip.recommendation import recommend as recommending
+from stickslip.recommendation.recommend import Drive
+from stickslip.recommendation.resolution import encoder_for
 from stickslip.record import Record
 from stickslip.verbs import recommend as verb
 from stickslip.verbs.identify import about

@@ -12,8 +12,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError
-from stickslip.identify.identified_file import Identified, read_identified
-from stickslip.recommend.axes import plants_of
+from stickslip.identification.identified_file import Identified, read_identified
+from stickslip.recommendation.axes import plants_of
 from support.belt import LOAD, MOTOR, coulomb, driven, followed
 
 BELT = 16.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stickslip.recommend.swings import repeats, turning_points, turns
+from stickslip.recommendation.swings import repeats, turning_points, turns
 
 TIME = np.arange(0.0, 1.0, 1e-3)
 

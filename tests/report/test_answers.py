@@ -15,9 +15,9 @@ import pytest
 from stickslip import Model
 from stickslip.finding import Finding
 from stickslip.identification.axis import identify_axis
-from stickslip.identify.estimate import Estimate, Held, Identification
-from stickslip.identify.experiment import Experiment
-from stickslip.identify.needed_motions import EXPERIMENTS, MOTIONS
+from stickslip.identification.estimate import Estimate, Held, Identification
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.needed_motions import EXPERIMENTS, MOTIONS
 from stickslip.machines.servo import ServoAxis
 from stickslip.messages import Surface, render, shown_on
 from stickslip.record import Record

@@ -11,9 +11,9 @@ import pytest
 
 from stickslip import Model
 from stickslip.identification.axis import identify_axis
-from stickslip.identify.estimate import Identification
-from stickslip.identify.experiment import Experiment
-from stickslip.identify.regression.inverse import inverse_dynamics
+from stickslip.identification.estimate import Identification
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.report.axis_evidence import beside, judgements, measured_friction, slow_rows
 from stickslip.report.axis_pictures import pictures_of

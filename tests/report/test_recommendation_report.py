@@ -54,8 +54,8 @@ MOTION = {"amplitude": 0.1, "frequency": 1.0}
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """One gain, so that a recommendation is quick."""
-    monkeypatch.setattr("stickslip.recommend.recommend.GAINS", (1.0,))
-    monkeypatch.setattr("stickslip.recommend.recommend.LEADS", (0.0,))
+    monkeypatch.setattr("stickslip.recommendation.recommend.GAINS", (1.0,))
+    monkeypatch.setattr("stickslip.recommendation.recommend.LEADS", (0.0,))
 
 
 @pytest.fixture
@@ -153,7 +153,7 @@ def test_the_report_answers_what_to_set_for_which_loop_and_when_to_repeat(
 def test_without_a_safe_compensator_the_report_gives_the_reason_and_the_error_of_the_loop_alone(
     model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip.recommend.candidates.WORTH", 0.0)
+    monkeypatch.setattr("stickslip.recommendation.candidates.WORTH", 0.0)
     advice = advised(model)
     assert advice.chosen is None
     words = Text(advice.report(tmp_path / "page.html").read_text()).words

@@ -22,8 +22,8 @@ from stickslip.report.figures import off_scale, result_cases
 from stickslip.report.plots import envelope, one_prefix, scaled
 from stickslip.report.styles import LINEAR as LINEAR_STYLES
 from stickslip.report.styles import REFERENCE, style_of, styles_of
-from stickslip.study.result import Run, StudyResult
-from stickslip.study.study import load, run
+from stickslip.studies.result import Run, StudyResult
+from stickslip.studies.study import load, run
 
 STUDY = """
 title = "Gantry <axis> & friends"

@@ -123,7 +123,8 @@ def test_the_embedded_picture_says_its_size() -> None:
 
 def test_no_picture_of_a_report_loads_matplotlib() -> None:
     code = (
-        "import sys, numpy as np; from stickslip.report import identified; from stickslip.identify.estimate import *;"
+        "import sys, numpy as np; from stickslip.report import identified;"
+        "from stickslip.identification.estimate import *;"
         "x = np.arange(3.0); p = Picture('a', 't', 'm', 'x (s)', 'y (N)', (Trace('l', x, x),));"
         "assert len(identified.figures([p])) == 1; assert 'matplotlib' not in sys.modules"
     )

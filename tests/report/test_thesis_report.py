@@ -8,8 +8,8 @@ import pytest
 
 from stickslip import report
 from stickslip.report._view import StudyView
-from stickslip.study.result import StudyResult
-from stickslip.study.study import load, run
+from stickslip.studies.result import StudyResult
+from stickslip.studies.study import load, run
 from stickslip.thesis.claims import CLAIMS, judge
 from support.places import REFERENCE, needs_reference
 

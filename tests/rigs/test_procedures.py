@@ -13,10 +13,10 @@ import pytest
 
 from stickslip.cli import main
 from stickslip.errors import InputError, UnknownName
-from stickslip.identify.experiment import experiment_of
-from stickslip.identify.presliding.breakaway import find_breaks
-from stickslip.identify.response.inertia import inertia
-from stickslip.identify.sliding.segments import sliding_points
+from stickslip.identification.experiment import experiment_of
+from stickslip.identification.presliding.breakaway import find_breaks
+from stickslip.identification.response.inertia import inertia
+from stickslip.identification.steady_friction.segments import sliding_points
 from stickslip.machines.files import machine
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import Record

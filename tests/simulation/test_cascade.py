@@ -14,7 +14,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
 from stickslip.errors import ConfigError, ParameterError
 from stickslip.spec import Surroundings
-from stickslip.study.study import load_run
+from stickslip.studies.study import load_run
 from support.sampled_text import Memory, sample, settings
 
 LOOP = Cascade(kv=60.0, kvp=0.05, kvi=1.0)

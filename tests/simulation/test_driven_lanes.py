@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip.identify.observer.observer import GRASP, Motion, Prepared, prepare
+from stickslip.identification.observer.observer import GRASP, Motion, Prepared, prepare
 from stickslip.jit import compiled_lanes, exponential
 from stickslip.laws import LAWS
 from stickslip.model import Model

@@ -18,7 +18,7 @@ from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.prescribed.open_loop import respond
-from stickslip.study.plan import load, load_run
+from stickslip.studies.plan import load, load_run
 from support.thesis_loops import INERTIA, PARAMETERS, PLANT
 
 SOFT = {**PLANT, "k": [300.0, 200.0, 100.0, 50.0], "fs": 0.5, "fc": 0.1}

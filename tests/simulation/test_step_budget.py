@@ -12,10 +12,10 @@ from stickslip.simulation.case_arrays import COLUMNS, NO_STEP, TOO_STIFF, Case, 
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.sampled import engine as sampled
-from stickslip.study.build import Numerics
-from stickslip.study.planned_run import PlannedRun
-from stickslip.sweep.measured import measured
-from stickslip.sweep.metric_check import checked
+from stickslip.studies.build import Numerics
+from stickslip.studies.planned_run import PlannedRun
+from stickslip.sweeps.measured import measured
+from stickslip.sweeps.metric_check import checked
 
 LUGRE = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}
 PD = ss.Controller(ss.place("PD", 4e-4, 10.0, 1.0))

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from stickslip.study import study as studies
-from stickslip.study.plan import load
+from stickslip.studies import study as studies
+from stickslip.studies.plan import load
 
 DATA = Path(__file__).parents[1] / "data"
 

@@ -14,9 +14,9 @@ from stickslip.machines.files import machine
 from stickslip.model import Model
 from stickslip.record import Record
 from stickslip.report.bench_report import table_of, write_bench_report
-from stickslip.study.bench import BenchRun, planned, read_bench, run_bench
-from stickslip.study.bench_decision import choices, knowledge_of, standings
-from stickslip.study.bench_metrics import judged
+from stickslip.studies.bench import BenchRun, planned, read_bench, run_bench
+from stickslip.studies.bench_decision import choices, knowledge_of, standings
+from stickslip.studies.bench_metrics import judged
 
 SMALL = """
 bench = "compensators"

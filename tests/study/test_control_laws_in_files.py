@@ -17,8 +17,8 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.control.registry import control_law
 from stickslip.errors import ConfigError
-from stickslip.study.study import execute, load, load_run
-from stickslip.sweep.numbers import as_columns, known, value_of, varied
+from stickslip.studies.study import execute, load, load_run
+from stickslip.sweeps.numbers import as_columns, known, value_of, varied
 
 OWN = Path(__file__).parents[1] / "support" / "sliding_mode.py"
 STUDY = """

@@ -16,9 +16,9 @@ from stickslip.control.linear import place
 from stickslip.errors import InputError, SimulationError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.simulation.closed_loop import simulate
-from stickslip.study import study as studies
-from stickslip.sweep import execute
-from stickslip.sweep.plan import load
+from stickslip.studies import study as studies
+from stickslip.sweeps import execute
+from stickslip.sweeps.plan import load
 
 FRICTION = ss.Model("coulomb", fc=0.3)
 AXIS = RigidAxis(4e-4, FRICTION)

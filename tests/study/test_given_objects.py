@@ -18,8 +18,8 @@ import stickslip as ss
 from stickslip.cli import main
 from stickslip.control.belief import Belief
 from stickslip.control.catalogue import CATALOGUE, LOOPS, compensated
-from stickslip.study.plan import load
-from stickslip.study.rerun import rerun
+from stickslip.studies.plan import load
+from stickslip.studies.rerun import rerun
 from support import laws
 from support.given_studies import (
     AXIS,

@@ -10,7 +10,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.errors import InputError, ModelRemark
-from stickslip.study.rerun import rerun
+from stickslip.studies.rerun import rerun
 from support.given_studies import AXIS, CONTROLLERS, LUGRE, PD, SINE, base, read
 
 SUPPORT = Path(__file__).parents[1] / "support"

@@ -16,12 +16,12 @@ from stickslip.errors import ConfigError
 from stickslip.machines.files import LIBRARY, machine
 from stickslip.machines.machine import IMPERFECTIONS
 from stickslip.simulation.machine.loop import FINER, simulate_machine
-from stickslip.study import study as studies
-from stickslip.study.plan import load, load_run
-from stickslip.sweep import plan as sweep_plan
-from stickslip.sweep.measured import measured
-from stickslip.sweep.metric_check import checked
-from stickslip.sweep.numbers import known, varied
+from stickslip.studies import study as studies
+from stickslip.studies.plan import load, load_run
+from stickslip.sweeps import plan as sweep_plan
+from stickslip.sweeps.measured import measured
+from stickslip.sweeps.metric_check import checked
+from stickslip.sweeps.numbers import known, varied
 
 STUDY = """
 [machines.all]
@@ -167,7 +167,7 @@ def test_a_swept_machine_is_checked_by_one_finer_run(run: Path, monkeypatch: pyt
         ran.append(tolerance)
         return simulate_machine(*given, tolerance=tolerance, **more)
 
-    monkeypatch.setattr("stickslip.sweep.measured.simulate_machine", counted)
+    monkeypatch.setattr("stickslip.sweeps.measured.simulate_machine", counted)
     planned, metrics = load_run(run), ["position_rms_rad"]
     values = {"machine.encoder.counts": np.array([known(planned)["machine.encoder.counts"]])}
     found = measured(planned, values, metrics, 1)

@@ -12,9 +12,9 @@ from stickslip.errors import CodeRefused
 from stickslip.model import Model
 from stickslip.report._view import StudyView
 from stickslip.report.html import notes
-from stickslip.study import study as studies
-from stickslip.study.plan import load, load_run
-from stickslip.study.rerun import rerun
+from stickslip.studies import study as studies
+from stickslip.studies.plan import load, load_run
+from stickslip.studies.rerun import rerun
 
 DATA = Path(__file__).parents[1] / "data"
 LAW = '''

@@ -13,10 +13,10 @@ from stickslip.errors import ConfigError, Interrupted
 from stickslip.machines.files import machine
 from stickslip.record import Record
 from stickslip.report import rig_report
-from stickslip.study import study as studies
-from stickslip.study.experiments import NOMINAL, ExperimentRun, ExperimentView, experiments_of, variant
-from stickslip.study.plan import load, select
-from stickslip.study.rerun import rerun
+from stickslip.studies import study as studies
+from stickslip.studies.experiments import NOMINAL, ExperimentRun, ExperimentView, experiments_of, variant
+from stickslip.studies.plan import load, select
+from stickslip.studies.rerun import rerun
 from stickslip.thesis.rig_claims import CLAIMS
 from stickslip.thesis.rig_reasons import WHY
 from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share, tally_imperfections, tally_starts

@@ -11,7 +11,7 @@ from stickslip.control.linear import place
 from stickslip.machines.files import machine
 from stickslip.report.analysis_pictures import draw_analysis
 from stickslip.report.stability_pictures import picture_of_confirmed
-from stickslip.study.stability_map import confirmed
+from stickslip.studies.stability_map import confirmed
 
 DRY = machine("thesis-dry")
 PD10 = place("PD", 3.8623e-4, 10.0, 1.0)

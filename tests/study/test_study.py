@@ -14,10 +14,10 @@ import pytest
 
 from stickslip.errors import InputError
 from stickslip.record import Record
-from stickslip.study import study as studies
-from stickslip.study.files import KEYS
-from stickslip.study.plan import load, select
-from stickslip.study.rerun import rerun
+from stickslip.studies import study as studies
+from stickslip.studies.files import KEYS
+from stickslip.studies.plan import load, select
+from stickslip.studies.rerun import rerun
 from support.thesis_loops import INERTIA, thesis_run
 
 DATA = Path(__file__).parents[1] / "data"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.experiment import Experiment
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Effect = Callable[[Array, Array, Array, Array], Array]

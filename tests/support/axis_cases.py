@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from stickslip import Model, Record
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.experiment import Experiment
 from stickslip.plugins import law
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.experiment import Experiment
 
 MOTOR, LOAD, STEP, EVERY = 3e-4, 5e-4, 5e-5, 20
 

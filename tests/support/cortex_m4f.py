@@ -14,9 +14,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from stickslip import plugins
-from stickslip.export import c99
-from stickslip.export.golden import golden
-from stickslip.export.job import Job
+from stickslip.exports import c99
+from stickslip.exports.golden import golden
+from stickslip.exports.job import Job
 from stickslip.model import Model
 from stickslip.spec import Surroundings
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import stickslip as ss
-from stickslip.study.plan import Study, load
+from stickslip.studies.plan import Study, load
 from stickslip.verbs.plain_given import file_of
 from stickslip.verbs.study_given import study_tables
 

@@ -9,9 +9,9 @@ import numpy as np
 import tomli_w
 
 from stickslip import Model
-from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.model_file import write_model
-from stickslip.identify.motion import sinusoid
+from stickslip.identification.estimate import Estimate, Identification
+from stickslip.identification.model_file import write_model
+from stickslip.identification.motion import sinusoid
 
 STRIBECK = {"k": 50.0, "fs": 0.335, "fc": 0.285, "vs": 0.1, "sigma2": 0.018}
 

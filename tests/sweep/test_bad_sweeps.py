@@ -8,11 +8,11 @@ import pytest
 
 from stickslip.cli import main
 from stickslip.errors import ConfigError, InputError, LawError
-from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.model_file import write_model
+from stickslip.identification.estimate import Estimate, Identification
+from stickslip.identification.model_file import write_model
 from stickslip.model import Model
-from stickslip.sweep import execute
-from stickslip.sweep.plan import load
+from stickslip.sweeps import execute
+from stickslip.sweeps.plan import load
 from support.sweeps import SMALL
 
 

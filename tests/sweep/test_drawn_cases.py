@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.model_file import write_model
+from stickslip.identification.estimate import Estimate, Identification
+from stickslip.identification.model_file import write_model
 from stickslip.model import Model
-from stickslip.sweep.plan import load
-from stickslip.sweep.sample import Drawn, Spread
+from stickslip.sweeps.plan import load
+from stickslip.sweeps.sample import Drawn, Spread
 
 
 @pytest.mark.parametrize("method", ["sobol", "latin"])

@@ -12,8 +12,8 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.errors import InputError
-from stickslip.sweep.plan import load
-from stickslip.sweep.rerun import rerun
+from stickslip.sweeps.plan import load
+from stickslip.sweeps.rerun import rerun
 from stickslip.verbs.plain_given import file_of
 from stickslip.verbs.study_given import sweep_tables
 from support.given_studies import AXIS, COULOMB, LUGRE, PD, PLAIN, RECORDED, SINE, base

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.sweep import dataset, numbers
-from stickslip.sweep.checked_numbers import unvaried_lines
-from stickslip.sweep.plan import load
-from stickslip.sweep.rerun import rerun
+from stickslip.sweeps import dataset, numbers
+from stickslip.sweeps.checked_numbers import unvaried_lines
+from stickslip.sweeps.plan import load
+from stickslip.sweeps.rerun import rerun
 
 STUDY = """
 [axis]

@@ -11,11 +11,11 @@ from stickslip.cli import main
 from stickslip.report import sweep_pictures
 from stickslip.report.sweep_pictures import draw
 from stickslip.report.swept_names import number_named, symbol
-from stickslip.study.study import load as study_of
-from stickslip.sweep import execute
-from stickslip.sweep.block import compute
-from stickslip.sweep.gains import recommended
-from stickslip.sweep.plan import BUILT_IN, load
+from stickslip.studies.study import load as study_of
+from stickslip.sweeps import execute
+from stickslip.sweeps.block import compute
+from stickslip.sweeps.gains import recommended
+from stickslip.sweeps.plan import BUILT_IN, load
 
 
 @pytest.mark.parametrize("name", BUILT_IN)

@@ -18,8 +18,8 @@ from stickslip.cli import main
 from stickslip.errors import InputError, UnknownName
 from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.sampled import engine as sampled
-from stickslip.sweep import block, dataset, execute, forecast, measured, metric_check, numbers, summary
-from stickslip.sweep.plan import load
+from stickslip.sweeps import block, dataset, execute, forecast, measured, metric_check, numbers, summary
+from stickslip.sweeps.plan import load
 from support.sweeps import SMALL, table
 
 

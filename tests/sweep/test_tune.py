@@ -10,10 +10,10 @@ import pytest
 from stickslip.cli import main
 from stickslip.cli import tune as help_of_tune
 from stickslip.errors import ConfigError, InputError
-from stickslip.sweep import tune as tuning
-from stickslip.sweep.measured import measured
-from stickslip.sweep.plan import load
-from stickslip.sweep.sample import Spread
+from stickslip.sweeps import tune as tuning
+from stickslip.sweeps.measured import measured
+from stickslip.sweeps.plan import load
+from stickslip.sweeps.sample import Spread
 
 SMALL = Path(__file__).with_name("small_tune.toml")
 

@@ -1,32 +1,35 @@
-"""What `help` says of a function that is a package, too; and what the package shows of itself."""
+"""What `help` shows of the verbs, and what the package shows of itself."""
 
 from __future__ import annotations
 
 import inspect
 import pydoc
 import re
-from types import ModuleType
+import subprocess
+import sys
 
 import pytest
 
 import stickslip as ss
 
-ROOMS = [name for name in ss.__all__ if isinstance(getattr(ss, name), ModuleType)]
+VERBS = ("export", "identify", "recommend", "study", "sweep")
 
 
-@pytest.mark.parametrize("name", ROOMS)
+@pytest.mark.parametrize("name", VERBS)
+def test_a_verb_is_a_function_whatever_was_imported_before(name: str) -> None:
+    """Rooms have other names than the functions, so no import replaces a function by a package."""
+    others = ("recommendation", "identification", "exports", "studies", "sweeps", "cli")
+    code = "".join(f"import stickslip.{room}\n" for room in others)
+    code += f"import stickslip, inspect\nassert inspect.isfunction(stickslip.{name})"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("name", VERBS)
 def test_help_shows_the_call_and_the_whole_text(name: str) -> None:
-    """It was that of a package: no signature, no defaults."""
-    function = getattr(ss, name)
-    page = pydoc.plain(pydoc.render_doc(function)).partition("PACKAGE CONTENTS")[0]
+    page = pydoc.plain(pydoc.render_doc(getattr(ss, name)))
     assert f"{name}(" in page
-    shown = " ".join(page.split())
-    for p in inspect.signature(function).parameters.values():
-        assert re.search(rf"\b{p.name}: {re.escape(str(p.annotation))}", shown), p.name
-        if p.default is not p.empty and not callable(p.default):
-            assert f"= {p.default!r}," in shown
-    for line in (inspect.unwrap(function).__doc__ or "").split("\n"):
-        assert " ".join(line.split()) in shown
+    for line in inspect.getdoc(getattr(ss, name)).split("\n"):
+        assert line.strip() in page
 
 
 def test_every_option_of_identify_is_described_where_it_is_listed() -> None:
@@ -39,8 +42,4 @@ def test_every_option_of_identify_is_described_where_it_is_listed() -> None:
 
 
 def test_the_package_shows_what_is_public() -> None:
-    """Its own helpers and imports stood among the names."""
-    shown = {name for name in dir(ss) if not name.startswith("__")}
-    packages = {name for name in shown if getattr(getattr(ss, name), "__name__", "") == f"stickslip.{name}"}
-    assert shown == {*ss.__all__, *packages}
-    assert not {"TYPE_CHECKING", "importlib", "sys", "_Room"} & shown
+    assert {name for name in dir(ss) if not name.startswith("__")} == set(ss.__all__)

@@ -16,7 +16,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.identify.identified_file import read_identified
+from stickslip.identification.identified_file import read_identified
 from support import axis_cases as cases
 
 LOOP = {"kp": 8.0, "kd": 0.08, "kr": 0.08, "limit": 3.0}
@@ -248,7 +248,7 @@ def test_an_unchanged_axis_compares_as_unchanged(result: ss.IdentificationResult
     "first",
     [
         "import stickslip.identification.axis",
-        "from stickslip.identify import doctor",
+        "from stickslip.identification import doctor",
         "import stickslip.verbs.identify",
     ],
 )
@@ -273,7 +273,7 @@ def test_a_recommendation_is_that_of_the_command_line_and_runs_in_a_simulation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     for name, few in (("GAINS", (0.9,)), ("LEADS", (0.5,)), ("BEYOND", (1.5,))):
-        monkeypatch.setattr(f"stickslip.recommend.recommend.{name}", few)
+        monkeypatch.setattr(f"stickslip.recommendation.recommend.{name}", few)
     out, options = (
         tmp_path / "recommended.toml",
         {"bandwidth": 20.0, "counts_per_rev": 65536.0, "axes": 1, "confirm": 2},

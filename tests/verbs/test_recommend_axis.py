@@ -17,7 +17,7 @@ SLOW = ss.Reference("sine", amplitude=0.01, frequency=0.4)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """One gain, so that a recommendation is quick."""
     for name, values in (("GAINS", (0.8,)), ("LEADS", (0.0,)), ("BEYOND", ())):
-        monkeypatch.setattr(f"stickslip.recommend.recommend.{name}", values)
+        monkeypatch.setattr(f"stickslip.recommendation.recommend.{name}", values)
 
 
 @pytest.mark.usefixtures("few")

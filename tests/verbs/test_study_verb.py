@@ -10,7 +10,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.study.plan import load
+from stickslip.studies.plan import load
 
 ONE = ("low", "signed", "nominal", "PD")
 

@@ -10,8 +10,8 @@ def run(args: argparse.Namespace) -> int:
     """Run the bench, print the best compensator for each condition, write the report."""
     from stickslip.cli import _output
     from stickslip.report.bench_report import write_bench_report
-    from stickslip.study.bench import path_of, run_bench
-    from stickslip.study.bench_decision import choices, standings
+    from stickslip.studies.bench import path_of, run_bench
+    from stickslip.studies.bench_decision import choices, standings
 
     if args.print:
         print(path_of(args.study).read_text(encoding="utf-8"), end="")

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from stickslip.study.result import Run, StudyResult
-    from stickslip.sweep.tune import Tuned
+    from stickslip.studies.result import Run, StudyResult
+    from stickslip.sweeps.tune import Tuned
 
 COLUMNS = (("position_rms_rad", 1e3, "RMS"), ("position_peak_rad", 1e3, "peak"))
 """Metrics of the table on the terminal, with their factor to mrad."""
@@ -194,7 +194,7 @@ def print_study(result: StudyResult, report: Path | None, kept: int) -> None:
 
     `kept` is the number of runs in metrics.csv.
     """
-    from stickslip.study.result import designed_for
+    from stickslip.studies.result import designed_for
 
     for rule in _each(result.runs, "slip_rule"):
         for reference in _each(result.runs, "reference"):
@@ -274,7 +274,7 @@ def report_failures(failed: Sequence[tuple[str, str, Path]]) -> int:
 
 def print_sweep(rows: Sequence[Mapping[str, Any]], metric: str, wall: float, written: Sequence[Path]) -> None:
     """Print one line per run: percentiles of a metric, flagged and missing cases."""
-    from stickslip.sweep.summary import summary_lines
+    from stickslip.sweeps.summary import summary_lines
 
     print(*summary_lines(rows, metric), sep="\n")
     print(f"{sum(row['cases'] for row in rows)} closed loops, {wall:.1f} s")

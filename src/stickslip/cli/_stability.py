@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from stickslip.control.linear import Gains
     from stickslip.machines.machine import Machine
     from stickslip.model import Model
-    from stickslip.study.stability_map import Confirmed
+    from stickslip.studies.stability_map import Confirmed
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,7 +70,7 @@ def work(
     found = computed(args)
     tried: Confirmed | None = None
     if args.confirm:
-        from stickslip.study.stability_map import confirmed
+        from stickslip.studies.stability_map import confirmed
 
         plant, gains, models = described(args)
         tried = confirmed(plant, gains, models, found.recommended, drawn=args.plot is not None)
@@ -116,7 +116,7 @@ def composed(
         raise InputError("--confirm runs the machine with its own delay; leave --delay out")
     amplitude, tried = args.amplitude, None
     if args.confirm:
-        from stickslip.study.controller_confirmed import confirmed_controller
+        from stickslip.studies.controller_confirmed import confirmed_controller
 
         tried = confirmed_controller(plant, controller)
         amplitude = amplitude or tried.amplitude  # the poles apply to the motion that is confirmed

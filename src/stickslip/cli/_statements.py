@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.report.rig_report import verdict_table
-from stickslip.study.experiments import ExperimentView
-from stickslip.study.result import StudyResult
+from stickslip.studies.experiments import ExperimentView
+from stickslip.studies.result import StudyResult
 from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share, tally_imperfections, tally_starts
 
 

@@ -300,7 +300,7 @@ def _attraction_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _attraction(args: argparse.Namespace) -> None:
-    from stickslip.identify.presliding.attraction import apply_overshoot_rule
+    from stickslip.identification.presliding.attraction import apply_overshoot_rule
     from stickslip.model import Model
 
     found = apply_overshoot_rule(

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from stickslip.cli import _files
 
 if TYPE_CHECKING:
-    from stickslip.export.target import Target
+    from stickslip.exports.target import Target
 
 NUMBERS = ("gain", "lead", "deadband", "offset", "inertia_feedforward", "filter_hz")
 SUMMARY = "export a model as C, structured text, MATLAB, Python, ..."
@@ -111,8 +111,8 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.cli import _output
     from stickslip.config import named_values
     from stickslip.errors import InputError
-    from stickslip.export import TARGETS, target_named
-    from stickslip.export.maps import MAP_TARGETS
+    from stickslip.exports import TARGETS, target_named
+    from stickslip.exports.maps import MAP_TARGETS
     from stickslip.verbs.export import export
 
     if args.list:

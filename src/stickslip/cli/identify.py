@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 from stickslip.cli import _files, _reading
 from stickslip.errors import one_line
-from stickslip.identify.methods import METHODS
+from stickslip.identification.methods import METHODS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

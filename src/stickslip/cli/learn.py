@@ -44,7 +44,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Learn, print the errors, write the controller."""
     from stickslip.cli import _output
-    from stickslip.study.study import load_run
+    from stickslip.studies.study import load_run
     from stickslip.verbs.learn import learn
     from stickslip.whole_files import prepared_folder
 

@@ -28,9 +28,9 @@ def run(args: argparse.Namespace) -> int:
     from stickslip.capacity import insist_on_jobs
     from stickslip.cli import _output
     from stickslip.errors import InputError
-    from stickslip.study.rerun import rerun as rerun_study
-    from stickslip.sweep.rerun import is_sweep
-    from stickslip.sweep.rerun import rerun as rerun_sweep
+    from stickslip.studies.rerun import rerun as rerun_study
+    from stickslip.sweeps.rerun import is_sweep
+    from stickslip.sweeps.rerun import rerun as rerun_sweep
 
     if args.jobs < 1:
         raise InputError(f"--jobs {args.jobs} must be at least 1; give the number of parallel runs")

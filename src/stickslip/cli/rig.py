@@ -273,7 +273,7 @@ def write_commissioned(
 ) -> tuple[Path, Path]:
     """Write model.toml, machine.toml, recommended.toml if there is one, and the report; return model and report."""
     from stickslip.commission.recommended import write_identified_machine, write_recommended
-    from stickslip.identify.model_file import versions, write_model
+    from stickslip.identification.model_file import versions, write_model
     from stickslip.report.identified import Source, write_identification
 
     stages = [s for s in found.stages if s.name != "angle"]  # a second evaluation of the sliding record

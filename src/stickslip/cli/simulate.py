@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the record and print the metrics."""
     from stickslip.cli import _output
     from stickslip.errors import InputError
-    from stickslip.study.study import execute, load_run
+    from stickslip.studies.study import execute, load_run
     from stickslip.whole_files import prepared_folder
 
     planned = load_run(args.file)

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any
 from stickslip.errors import InputError, Interrupted
 
 if TYPE_CHECKING:
-    from stickslip.study.plan import Study
-    from stickslip.study.result import StudyResult
+    from stickslip.studies.plan import Study
+    from stickslip.studies.result import StudyResult
 
 SUMMARY = "compare controllers over references and friction models"
 
@@ -57,7 +57,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run, print the table, write the report."""
-    from stickslip.study.bench import is_bench
+    from stickslip.studies.bench import is_bench
 
     if is_bench(args.study):
         from stickslip.cli import _bench
@@ -84,7 +84,7 @@ def _ran(study: Study, only: list[str] | None, args: argparse.Namespace) -> tupl
     """Run it and write its report."""
     from stickslip.cli import _output
     from stickslip.report import write
-    from stickslip.study import study as studies
+    from stickslip.studies import study as studies
 
     out: Path = args.out or Path(f"study-{study.name}")
     try:

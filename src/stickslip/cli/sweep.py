@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from stickslip.sweep.plan import Sweep
+    from stickslip.sweeps.plan import Sweep
 
 MANY = 1000
 """Number of closed loops above which the duration is estimated in advance."""
@@ -45,7 +45,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def announced(sweep: Sweep, jobs: int) -> Sweep:
     """Print the estimated duration of a long sweep from a few of its cases; these also determine the size of blocks."""
     from stickslip.cli import _output
-    from stickslip.sweep.forecast import block_size, paces_of, seconds_of
+    from stickslip.sweeps.forecast import block_size, paces_of, seconds_of
 
     if sweep.cases < MANY:
         return sweep
@@ -63,8 +63,8 @@ def run(args: argparse.Namespace) -> int:
     """Run, print the summary, draw the figures."""
     from stickslip.cli import _output
     from stickslip.errors import InputError
-    from stickslip.sweep import execute
-    from stickslip.sweep.plan import load
+    from stickslip.sweeps import execute
+    from stickslip.sweeps.plan import load
     from stickslip.verbs.sweep import sweep, sweep_of
 
     if args.print:

@@ -41,9 +41,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Search, print the settings, draw the trade-off."""
     from stickslip.cli import _output
-    from stickslip.study.files import claim_folder
-    from stickslip.study.study import interrupts_between_runs
-    from stickslip.sweep.checked_numbers import unvaried_lines
+    from stickslip.studies.files import claim_folder
+    from stickslip.studies.study import interrupts_between_runs
+    from stickslip.sweeps.checked_numbers import unvaried_lines
     from stickslip.verbs.tune import tune, tuning_of, written
 
     sweep = tuning_of(args.tune)

@@ -13,7 +13,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print one line per package."""
-    from stickslip.study.provenance import versions
+    from stickslip.studies.provenance import versions
 
     for name, version in versions().items():
         print(f"{name} {version}")

@@ -23,17 +23,17 @@ from stickslip.commission.result import Stage, result_of
 from stickslip.commission.resume import kept, stamped
 from stickslip.commission.stiffness import joined_model, resolved, with_lag, with_stiffness
 from stickslip.errors import InputError, LimitCrossed
-from stickslip.identify.cogging import identify_cogging
-from stickslip.identify.estimate import Identification
-from stickslip.identify.experiment import experiment_of
-from stickslip.identify.presliding.breakaway import WINDOW, identify_breakaway
-from stickslip.identify.presliding.hysteresis import Loop as Hysteresis
-from stickslip.identify.presliding.lugre_dynamics import Response, identify_lugre_dynamics
-from stickslip.identify.presliding.presliding import identify_presliding
-from stickslip.identify.response.drivetrain import fit_drivetrain, identified_drivetrain, loop_response
-from stickslip.identify.response.inertia import inertia
-from stickslip.identify.response.nyquist import fastest_pd
-from stickslip.identify.sliding.position_dependence import identify_angle
+from stickslip.identification.cogging import identify_cogging
+from stickslip.identification.estimate import Identification
+from stickslip.identification.experiment import experiment_of
+from stickslip.identification.presliding.breakaway import WINDOW, identify_breakaway
+from stickslip.identification.presliding.hysteresis import Loop as Hysteresis
+from stickslip.identification.presliding.lugre_dynamics import Response, identify_lugre_dynamics
+from stickslip.identification.presliding.presliding import identify_presliding
+from stickslip.identification.response.drivetrain import fit_drivetrain, identified_drivetrain, loop_response
+from stickslip.identification.response.inertia import inertia
+from stickslip.identification.response.nyquist import fastest_pd
+from stickslip.identification.steady_friction.position_dependence import identify_angle
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
@@ -92,7 +92,7 @@ class Commissioned:
     stiffness : float
         Total pre-sliding stiffness at the encoder, N·m/rad: contact and shaft in series.
     result : Identification
-        All of it, for `stickslip.identify.model_file.write_model` and the report.
+        All of it, for `stickslip.identification.model_file.write_model` and the report.
     """
 
     stages: tuple[Stage, ...]

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.errors import InputError
-from stickslip.identify.estimate import Estimate, Identification, Picture, Trace
-from stickslip.identify.presliding.hysteresis import Loop, correlation_lags
+from stickslip.identification.estimate import Estimate, Identification, Picture, Trace
+from stickslip.identification.presliding.hysteresis import Loop, correlation_lags
 from stickslip.machines.angle import AngleMap, harmonic_sum
 from stickslip.model import Model
 from stickslip.record import Record

@@ -9,8 +9,8 @@ import numpy as np
 
 from stickslip.analyse.wording import ends
 from stickslip.commission.recommended import NONE_SAFE
-from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.monte_carlo import resisting_torque
+from stickslip.identification.estimate import Estimate, Identification
+from stickslip.identification.monte_carlo import resisting_torque
 
 if TYPE_CHECKING:
     from stickslip.commission.commission import Commissioned

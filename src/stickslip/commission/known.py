@@ -11,19 +11,19 @@ import math
 from dataclasses import dataclass
 from typing import Any, cast
 
-from stickslip.identify.response.drivetrain import FittedDrivetrain
-from stickslip.identify.response.nyquist import Fastest
+from stickslip.identification.response.drivetrain import FittedDrivetrain
+from stickslip.identification.response.nyquist import Fastest
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.contact import Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import LONGEST_DELAY, Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.model import Model
-from stickslip.recommend.candidate_run import Drive
-from stickslip.recommend.plant import WholeMachine
-from stickslip.recommend.question import laws_of
-from stickslip.recommend.recommend import recommend_on
-from stickslip.recommend.recommendation import Recommendation
+from stickslip.recommendation.candidate_run import Drive
+from stickslip.recommendation.plant import WholeMachine
+from stickslip.recommendation.question import laws_of
+from stickslip.recommendation.recommend import recommend_on
+from stickslip.recommendation.recommendation import Recommendation
 from stickslip.record import Record, encoder_step
 from stickslip.rigs.procedures.moves import ROOM
 from stickslip.rigs.procedures.track import REFERENCES

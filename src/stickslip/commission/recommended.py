@@ -1,8 +1,8 @@
 """What to switch on: bandwidth, law, structure and gain for a commissioned machine, and what they do on it.
 
 The bandwidth comes from the measured response: `MARGIN` below that from which a PD rings, sliding or sticking. The rest
-is chosen as for any model (`stickslip.recommend`), on the machine as it was identified. Then the machine itself follows
-the slow sinusoid with the PD alone and with the compensator, at this bandwidth and at lower ones.
+is chosen as for any model (`stickslip.recommendation`), on the machine as it was identified. Then the machine itself
+follows the slow sinusoid with the PD alone and with the compensator, at this bandwidth and at lower ones.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ import numpy as np
 from stickslip.analyse.tracking import tracking_metrics
 from stickslip.commission.known import LEVELS, MARGIN, Known, laws_to_try
 from stickslip.control.controller import Controller
-from stickslip.identify.estimate import Identification, Picture, Trace
-from stickslip.identify.model_file import write_model
+from stickslip.identification.estimate import Identification, Picture, Trace
+from stickslip.identification.model_file import write_model
 from stickslip.machines.angle import AngleMap
 from stickslip.model import Model
-from stickslip.recommend.file import recommended_table
-from stickslip.recommend.recommendation import Recommendation
+from stickslip.recommendation.file import recommended_table
+from stickslip.recommendation.recommendation import Recommendation
 from stickslip.record import Record
 from stickslip.rigs.procedures.base import Performed, Plan
 from stickslip.rigs.procedures.track import REFERENCES, Track

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.commission.recommended import TrackedRecommendation, picture_of_candidates, picture_of_tracking
-from stickslip.identify.estimate import Estimate, Identification, Picture
+from stickslip.identification.estimate import Estimate, Identification, Picture
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.position_map import PositionMap
 from stickslip.model import Model

@@ -10,10 +10,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.identify.estimate import Estimate, Identification
-from stickslip.identify.fit.student import student_quantile
-from stickslip.identify.monte_carlo import WIDEST
-from stickslip.identify.presliding.attraction import apply_overshoot_rule
+from stickslip.identification.estimate import Estimate, Identification
+from stickslip.identification.fit.student import student_quantile
+from stickslip.identification.monte_carlo import WIDEST
+from stickslip.identification.presliding.attraction import apply_overshoot_rule
 from stickslip.model import Model
 from stickslip.record import Record
 

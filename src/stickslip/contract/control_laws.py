@@ -41,7 +41,7 @@ from stickslip.control.read_law import insist_on_subset
 from stickslip.control.registry import control_law
 from stickslip.control_spec import ControlLaw
 from stickslip.errors import LawError
-from stickslip.export import c99_controller
+from stickslip.exports import c99_controller
 from stickslip.model import Model
 from stickslip.simulation.compiled_controller import compiled
 from stickslip.spec import Field, Surroundings

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from stickslip.contract.verdict import Verdict, held, not_tried
-from stickslip.export import TARGETS, target_named
-from stickslip.export.job import CannotCarry, Job
+from stickslip.exports import TARGETS, target_named
+from stickslip.exports.job import CannotCarry, Job
 from stickslip.model import Model
 from stickslip.spec import Law
 

@@ -11,7 +11,7 @@ import numpy as np
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control_spec import ControlLaw
-from stickslip.export.golden import random_motion
+from stickslip.exports.golden import random_motion
 from stickslip.model import Model
 from stickslip.simulation.compiled_controller import FAULT, Sampled, replay
 from stickslip.spec import Surroundings

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from stickslip import Model
-from stickslip.identify.estimate import Identification
-from stickslip.identify.sliding.curve import identify_sliding
-from stickslip.identify.sliding.points import SlidingPoints
+from stickslip.identification.estimate import Identification
+from stickslip.identification.steady_friction.curve import identify_sliding
+from stickslip.identification.steady_friction.points import SlidingPoints
 from stickslip.report.analysis_pictures import Drawn
 from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style

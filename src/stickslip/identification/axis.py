@@ -4,7 +4,7 @@ Gross sliding tells inertia, constant torque, gravity, delay and the steady fric
 (`stickslip.identification.sliding`). What reversals, break-away and slow motion tell of a law comes from its simulation
 beside that (`stickslip.identification.slow_motion`). Of several laws the error on held-out data chooses
 (`stickslip.identification.laws`). Records without the drive's signal are fitted by the output error
-(`stickslip.identify.axis.output`).
+(`stickslip.identification.output_error.output`).
 """
 
 from __future__ import annotations
@@ -46,20 +46,20 @@ from stickslip.identification.slow_motion import (
     means_the_same,
     moments,
 )
-from stickslip.identify.axis.gravity import hanging, within_a_turn
-from stickslip.identify.axis.load_check import ADVICE, judged_load
-from stickslip.identify.axis.loop_check import doubted_loops
-from stickslip.identify.axis.output import OutputError, judged
-from stickslip.identify.axis.problem import Problem, mechanics_parameters
-from stickslip.identify.axis.search import Asked, Extras, FittedAxis, errors_of, fitted_axis, require_start
-from stickslip.identify.estimate import Estimate, Identification, silent
-from stickslip.identify.experiment import Experiment, insist_on_motion
-from stickslip.identify.fit.axis_start import each_way
-from stickslip.identify.fit.noise import Noise
-from stickslip.identify.fit.parameter_vector import Parameter, Vector
-from stickslip.identify.fit.uncertainty import verdict_on
-from stickslip.identify.regression.force_error import force_error, force_error_on, plain_error_on
-from stickslip.identify.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
+from stickslip.identification.output_error.gravity import hanging, within_a_turn
+from stickslip.identification.output_error.load_check import ADVICE, judged_load
+from stickslip.identification.output_error.loop_check import doubted_loops
+from stickslip.identification.output_error.output import OutputError, judged
+from stickslip.identification.output_error.problem import Problem, mechanics_parameters
+from stickslip.identification.output_error.search import Asked, Extras, FittedAxis, errors_of, fitted_axis, require_start
+from stickslip.identification.estimate import Estimate, Identification, silent
+from stickslip.identification.experiment import Experiment, insist_on_motion
+from stickslip.identification.fit.axis_start import each_way
+from stickslip.identification.fit.noise import Noise
+from stickslip.identification.fit.parameter_vector import Parameter, Vector
+from stickslip.identification.fit.uncertainty import verdict_on
+from stickslip.identification.regression.force_error import force_error, force_error_on, plain_error_on
+from stickslip.identification.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
 from stickslip.machines.servo import ServoAxis
 from stickslip.messages import Note, name_columns, name_option
 from stickslip.model import Model
@@ -118,7 +118,7 @@ def identify_axis(
         Held out. Without any, and with several laws, the last 30 % of every record are held out for the choice (the
         first, where the end is half as fast again as all before), and the chosen law is then fitted to all.
     free, frozen, values, extras
-        As in `stickslip.identify.axis.output.output_error`.
+        As in `stickslip.identification.output_error.output.output_error`.
     robust, profiles
         As there, for the output error alone; the prediction error weighs outliers anyway.
     per_direction : bool

@@ -11,16 +11,16 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identification.slow_motion import Evidence, held_elsewhere, search_law, start_beside
-from stickslip.identify.axis.search import Asked, errors_of, fitted_axis
-from stickslip.identify.axis.starts import motion_of, watched
-from stickslip.identify.estimate import silent
-from stickslip.identify.experiment import Experiment
-from stickslip.identify.fit.axis_start import feasible
-from stickslip.identify.fit.parallel import mapped
-from stickslip.identify.fit.parameter_vector import Vector
-from stickslip.identify.observer.innovations import BAND, DELAY, FIRST, Criterion, robust_std
-from stickslip.identify.observer.observer import Motion, Prepared, prepare
-from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identification.output_error.search import Asked, errors_of, fitted_axis
+from stickslip.identification.output_error.starts import motion_of, watched
+from stickslip.identification.estimate import silent
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.fit.axis_start import feasible
+from stickslip.identification.fit.parallel import mapped
+from stickslip.identification.fit.parameter_vector import Vector
+from stickslip.identification.observer.innovations import BAND, DELAY, FIRST, Criterion, robust_std
+from stickslip.identification.observer.observer import Motion, Prepared, prepare
+from stickslip.identification.regression.inverse import InverseDynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.model import Model
 from stickslip.spec import Law

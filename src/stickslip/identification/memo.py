@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from stickslip.identification.search import Asked
 from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 
 EstimateSliding = Callable[..., SlidingPosterior]

@@ -17,7 +17,7 @@ from stickslip.identification.strokes import (
     sliding_record,
 )
 from stickslip.identification.windows import apply_at, window_weights
-from stickslip.identify.experiment import Experiment
+from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -22,8 +22,8 @@ from stickslip.identification.mixture import NEGLIGIBLE, Member, Mixture, mix
 from stickslip.identification.posterior import EXPONENT_ODDS, EXPONENTS
 from stickslip.identification.rows import LATEST, SlidingRows, sample_rows, sliding_rows
 from stickslip.identification.search import Asked, Fit, Start, settle
-from stickslip.identify.experiment import Experiment, insist_on_motion
-from stickslip.identify.fit.student import student_quantile
+from stickslip.identification.experiment import Experiment, insist_on_motion
+from stickslip.identification.fit.student import student_quantile
 from stickslip.machines.servo import ServoAxis
 from stickslip.messages import name_option
 

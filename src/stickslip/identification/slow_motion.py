@@ -1,7 +1,7 @@
 """What reversals, break-away and slow motion say of a law: its simulation, held to the measured motion.
 
 The simulated axis is driven by the recorded torque and follows the measured motion through an observer
-(`stickslip.identify.observer.observer`); the torque that this takes is the misfit, whitened by an autoregression,
+(`stickslip.identification.observer.observer`); the torque that this takes is the misfit, whitened by an autoregression,
 outliers weighed by Student's distribution (prediction-error method: Ljung 1999, chapters 7 and 9). The torque's delay
 is inside: the simulated axis gets the torque when it acted.
 
@@ -26,26 +26,26 @@ from stickslip.binding import NEGATIVE
 from stickslip.errors import InputError
 from stickslip.identification.posterior import log_sum
 from stickslip.identification.sliding import QUANTILE, SlidingPosterior, quantiles
-from stickslip.identify.axis.gravity import hanging
-from stickslip.identify.axis.problem import mechanics_of
-from stickslip.identify.axis.search import Asked, laid_out
-from stickslip.identify.axis.starts import Watched, starting_points, watched
-from stickslip.identify.estimate import Estimate
-from stickslip.identify.experiment import Experiment
-from stickslip.identify.fit.axis_start import feasible
-from stickslip.identify.fit.jackknife import leave_blocks_out
-from stickslip.identify.fit.noise import Noise
-from stickslip.identify.fit.parallel import mapped
-from stickslip.identify.fit.parameter_vector import Parameter, Vector
-from stickslip.identify.fit.sample_rate_limit import (
+from stickslip.identification.output_error.gravity import hanging
+from stickslip.identification.output_error.problem import mechanics_of
+from stickslip.identification.output_error.search import Asked, laid_out
+from stickslip.identification.output_error.starts import Watched, starting_points, watched
+from stickslip.identification.estimate import Estimate
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.fit.axis_start import feasible
+from stickslip.identification.fit.jackknife import leave_blocks_out
+from stickslip.identification.fit.noise import Noise
+from stickslip.identification.fit.parallel import mapped
+from stickslip.identification.fit.parameter_vector import Parameter, Vector
+from stickslip.identification.fit.sample_rate_limit import (
     of_presliding,
     stiffness_at_rest,
     unresolved_refused,
     unseen_refused,
 )
-from stickslip.identify.fit.student import student_quantile
-from stickslip.identify.fit.uncertainty import interval_of, verdict_on
-from stickslip.identify.observer.innovations import (
+from stickslip.identification.fit.student import student_quantile
+from stickslip.identification.fit.uncertainty import interval_of, verdict_on
+from stickslip.identification.observer.innovations import (
     BLOCK,
     DELAY,
     Criterion,
@@ -54,8 +54,8 @@ from stickslip.identify.observer.innovations import (
     ridge_of,
     weighted,
 )
-from stickslip.identify.observer.observer import EXACT, ROUGH, prepare
-from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identification.observer.observer import EXACT, ROUGH, prepare
+from stickslip.identification.regression.inverse import InverseDynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.messages import name_parameter
 from stickslip.model import Model

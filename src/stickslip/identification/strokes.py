@@ -12,8 +12,8 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.identification.windows import LEAST_SAMPLES, apply_at, unblurred_weights, window_weights
-from stickslip.identify.experiment import Experiment
-from stickslip.identify.regression.inverse import uniform, white_noise
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.regression.inverse import uniform, white_noise
 from stickslip.machines.servo import ServoAxis
 from stickslip.record import encoder_step
 

@@ -170,7 +170,7 @@ def _rate(record: Record) -> float:
         raise InputError("the record is not evenly sampled; call `with_resampled_time` first")
     if not np.isfinite(record["position"]).all():
         raise InputError(
-            "the position has missing values; `stickslip.identify.doctor.examine` leaves them out"
+            "the position has missing values; `stickslip.identification.doctor.examine` leaves them out"
         )
     return 1.0 / period
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stickslip.study.result import StudyResult
+from stickslip.studies.result import StudyResult
 
 if TYPE_CHECKING:
     from stickslip.report.figures import Figure

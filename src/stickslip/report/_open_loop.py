@@ -19,9 +19,9 @@ from stickslip.report.plots import Array, Curve, Panel, draw, envelope, one_pref
 from stickslip.report.styles import Style, style_of, styles_of
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.prescribed.open_loop import respond
-from stickslip.study.open_loop import Drive, Response
-from stickslip.study.plan import Study, load
-from stickslip.study.result import StudyResult
+from stickslip.studies.open_loop import Drive, Response
+from stickslip.studies.plan import Study, load
+from stickslip.studies.result import StudyResult
 
 NEAR_ZERO = 0.04  # rad/s, the range shown in the thesis for comparing laws
 GRID = 20_000  # instants of a response

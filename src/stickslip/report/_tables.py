@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from stickslip.report._view import StudyView
 from stickslip.report.captions import HUNTS
-from stickslip.study.result import Run
+from stickslip.studies.result import Run
 
 
 @dataclass(frozen=True)

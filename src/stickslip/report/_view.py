@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from stickslip.record import Record
-from stickslip.study.result import Run, StudyResult
+from stickslip.studies.result import Run, StudyResult
 from stickslip.thesis.edition import EDITIONS, PLAIN
 
 

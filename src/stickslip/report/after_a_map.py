@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from stickslip.identify.estimate import Identification
+from stickslip.identification.estimate import Identification
 
 
 def after_a_map(found: Identification, model_file: str | Path) -> tuple[str, str, str]:

@@ -16,7 +16,7 @@ from stickslip.analyse.flexibility import Flexibility
 from stickslip.analyse.motor_vs_sensor import Sides
 from stickslip.analyse.repeatability import Repeated
 from stickslip.analyse.spectrum import Spectrum
-from stickslip.identify.presliding.attraction import OvershootRule
+from stickslip.identification.presliding.attraction import OvershootRule
 from stickslip.machines.drivetrain import Chain, Modes
 from stickslip.report.plots import Curve, Panel, envelope, save, scaled
 from stickslip.report.styles import Style

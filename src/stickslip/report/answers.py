@@ -15,13 +15,13 @@ import numpy as np
 
 from stickslip.identification.notes import CONTRADICTED, TIMING_CONTRADICTED, drift_of, on_timing
 from stickslip.identification.sliding import SlidingPosterior
-from stickslip.identify.axis.loop_check import OTHER_LOOP
-from stickslip.identify.axis.problem import mechanics_parameters
-from stickslip.identify.doctor.change import DRIFTS_BY
-from stickslip.identify.estimate import Estimate, Identification, missing_fall
-from stickslip.identify.monte_carlo import resisting_torque
-from stickslip.identify.motion import speeds_of
-from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identification.output_error.loop_check import OTHER_LOOP
+from stickslip.identification.output_error.problem import mechanics_parameters
+from stickslip.identification.doctor.change import DRIFTS_BY
+from stickslip.identification.estimate import Estimate, Identification, missing_fall
+from stickslip.identification.monte_carlo import resisting_torque
+from stickslip.identification.motion import speeds_of
+from stickslip.identification.regression.inverse import InverseDynamics
 from stickslip.machines.servo import ServoAxis
 from stickslip.messages import code_of, name_option, render, rendered
 from stickslip.record import Record

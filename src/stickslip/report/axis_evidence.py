@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.axis.loop_check import position_noise
-from stickslip.identify.axis.search import FittedAxis
-from stickslip.identify.estimate import Identification
-from stickslip.identify.experiment import Experiment
-from stickslip.identify.fit.noise import white_std
-from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identification.output_error.loop_check import position_noise
+from stickslip.identification.output_error.search import FittedAxis
+from stickslip.identification.estimate import Identification
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.fit.noise import white_std
+from stickslip.identification.regression.inverse import InverseDynamics
 from stickslip.messages import Note, code_of, name_option, render
 from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Mechanics

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.axis.problem import PLACE, measured
-from stickslip.identify.axis.search import FittedAxis
-from stickslip.identify.estimate import Identification, Picture, Trace
-from stickslip.identify.monte_carlo import curve_band, resisting_torque
-from stickslip.identify.regression.inverse import InverseDynamics
+from stickslip.identification.output_error.problem import PLACE, measured
+from stickslip.identification.output_error.search import FittedAxis
+from stickslip.identification.estimate import Identification, Picture, Trace
+from stickslip.identification.monte_carlo import curve_band, resisting_torque
+from stickslip.identification.regression.inverse import InverseDynamics
 from stickslip.record import Record
 from stickslip.report.axis_evidence import measured_friction, slow_rows
 from stickslip.report.plots import envelope, quantity

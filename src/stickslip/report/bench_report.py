@@ -13,8 +13,8 @@ from typing import Any
 from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.learned import told
 from stickslip.report.page import filled
-from stickslip.study.bench import BenchResult, BenchRun
-from stickslip.study.bench_decision import CONDITIONS, LATE, USUAL, Choice, Standing, choices, standings
+from stickslip.studies.bench import BenchResult, BenchRun
+from stickslip.studies.bench_decision import CONDITIONS, LATE, USUAL, Choice, Standing, choices, standings
 from stickslip.whole_files import write_whole
 
 WIDTH, LEFT, ROW, TOP = 760.0, 190.0, 15.0, 46.0

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from stickslip.analyse.wording import quantity
-from stickslip.study.result import Run
+from stickslip.studies.result import Run
 
 OSCILLATES = 20e-3  # rad/s RMS above 50 Hz, as in the statements
 MILLI = (1e3, "mrad")

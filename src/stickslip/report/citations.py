@@ -14,8 +14,8 @@ from stickslip.config import refuse_endless
 from stickslip.errors import InputError
 from stickslip.record import Record
 from stickslip.spec import Law
-from stickslip.study.plan import Study, load, load_run
-from stickslip.study.planned_run import PlannedRun
+from stickslip.studies.plan import Study, load, load_run
+from stickslip.studies.planned_run import PlannedRun
 
 INTEGRATORS = {"adaptive": ("dormand1980", "sommeijer1998"), "auto": ("dormand1980", "sommeijer1998")}
 """References of the integrators' methods."""

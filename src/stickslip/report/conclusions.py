@@ -8,7 +8,7 @@ from typing import Any
 
 from stickslip.report._view import StudyView
 from stickslip.report.captions import figure_of_merit, oscillates, ranking
-from stickslip.study.result import Run
+from stickslip.studies.result import Run
 
 MOST = 1000.0
 """Largest ratio of errors to print."""

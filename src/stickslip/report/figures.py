@@ -16,7 +16,7 @@ from stickslip.report._view import StudyView
 from stickslip.report.captions import case_caption, case_message, error_of
 from stickslip.report.plots import Curve, Panel, draw, envelope, one_prefix
 from stickslip.report.styles import LAWS, REFERENCE, Style, styles_of
-from stickslip.study.result import Run
+from stickslip.studies.result import Run
 
 COMMON = "both"  # folder of the figures that are equal for all slip rules
 LINES = 7  # most controllers in one figure

@@ -14,7 +14,7 @@ from stickslip.report.conclusions import study_conclusion
 from stickslip.report.figures import COMMON, Figure
 from stickslip.report.page import filled
 from stickslip.report.plots import embedded
-from stickslip.study.result import designed_for
+from stickslip.studies.result import designed_for
 from stickslip.thesis.claims import Claim, Verdict, judge
 from stickslip.thesis.edition import SLIP, Note
 

@@ -1,4 +1,4 @@
-"""Draw pictures of an identification (`stickslip.identify.estimate.Picture`) in the house style."""
+"""Draw pictures of an identification (`stickslip.identification.estimate.Picture`) in the house style."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.estimate import Picture, Trace
+from stickslip.identification.estimate import Picture, Trace
 from stickslip.report import plots
 from stickslip.report.styles import REFERENCE, Style
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from stickslip.analyse.wording import ends
 from stickslip.finding import Finding
-from stickslip.identify.axis.search import FittedAxis
-from stickslip.identify.estimate import Estimate, Held, Identification, Picture
+from stickslip.identification.output_error.search import FittedAxis
+from stickslip.identification.estimate import Estimate, Held, Identification, Picture
 from stickslip.messages import code_of
 from stickslip.record import Record
 from stickslip.report.answers import answers_of, meaning_of, one_number_each, speeds_in

@@ -12,8 +12,8 @@ from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import REFERENCE_VELOCITY, USUAL_TIME
 from stickslip.errors import InputError
 from stickslip.identification.sliding import SlidingPosterior
-from stickslip.identify.estimate import Identification
-from stickslip.identify.needed_motions import MOTIONS, experiment_for
+from stickslip.identification.estimate import Identification
+from stickslip.identification.needed_motions import MOTIONS, experiment_for
 from stickslip.machines.servo import ServoAxis
 from stickslip.messages import name_option, render
 from stickslip.record import SAME_COUNTS, Record, counts_of_step, encoder_step, row_period

@@ -10,13 +10,13 @@ from stickslip.analyse.wording import quantity
 from stickslip.control.learned import told
 from stickslip.control.linear import Cascade
 from stickslip.control.registry import control_law
-from stickslip.identify.identified_file import Identified
+from stickslip.identification.identified_file import Identified
 from stickslip.model import Model
-from stickslip.recommend.beside import Beside
-from stickslip.recommend.candidates import Candidate
-from stickslip.recommend.course import measured
-from stickslip.recommend.notes import ALLOWANCE, not_simulated
-from stickslip.recommend.recommendation import Recommendation
+from stickslip.recommendation.beside import Beside
+from stickslip.recommendation.candidates import Candidate
+from stickslip.recommendation.course import measured
+from stickslip.recommendation.notes import ALLOWANCE, not_simulated
+from stickslip.recommendation.recommendation import Recommendation
 from stickslip.report.plots import one_prefix
 
 BEATEN = "not tried further: another one leaves less"

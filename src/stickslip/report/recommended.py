@@ -14,11 +14,11 @@ import numpy as np
 
 from stickslip.analyse.controller_margins import LATEST, ControllerStability
 from stickslip.analyse.wording import quantity
-from stickslip.identify.estimate import Picture
-from stickslip.identify.identified_file import Identified
-from stickslip.recommend.candidate_run import Trial
-from stickslip.recommend.notes import not_simulated
-from stickslip.recommend.recommendation import ALLOWANCE, Comparison, Recommendation
+from stickslip.identification.estimate import Picture
+from stickslip.identification.identified_file import Identified
+from stickslip.recommendation.candidate_run import Trial
+from stickslip.recommendation.notes import not_simulated
+from stickslip.recommendation.recommendation import ALLOWANCE, Comparison, Recommendation
 from stickslip.report import plots
 from stickslip.report.identification import panel_of
 from stickslip.report.page import filled

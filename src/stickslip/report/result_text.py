@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from stickslip.analyse.wording import ends
-from stickslip.identify.estimate import Estimate, Identification
+from stickslip.identification.estimate import Estimate, Identification
 from stickslip.report.answers import Answers, meaning_of, one_number_each
 from stickslip.report.next_steps import BY_A_RIG, Step
 

@@ -17,8 +17,8 @@ from stickslip.report.html import image
 from stickslip.report.page import filled
 from stickslip.report.plots import Curve, Panel, draw, envelope
 from stickslip.report.styles import REFERENCE, style_of
-from stickslip.study.experiments import Experiment, ExperimentView, experiments_of
-from stickslip.study.result import Run, StudyResult
+from stickslip.studies.experiments import Experiment, ExperimentView, experiments_of
+from stickslip.studies.result import Run, StudyResult
 from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share
 from stickslip.whole_files import write_whole
 

@@ -12,7 +12,7 @@ from stickslip.analyse.stability import SLOW
 from stickslip.analyse.stability_result import FILTERS, GAINS, TIMES, Map, Stability
 from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import Style
-from stickslip.study.stability_map import FINE, FINE_GAINS, OPEN, Confirmed
+from stickslip.studies.stability_map import FINE, FINE_GAINS, OPEN, Confirmed
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

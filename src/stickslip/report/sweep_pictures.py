@@ -12,13 +12,13 @@ from stickslip.report.plots import Curve, Panel, one_prefix, scaled
 from stickslip.report.plots import draw as draw_panels
 from stickslip.report.styles import Style, styles_of
 from stickslip.report.swept_names import metric_named, number_named
-from stickslip.study.planned_run import PlannedRun
-from stickslip.sweep.dataset import read
-from stickslip.sweep.gains import GAIN, recommended
-from stickslip.sweep.plan import Sweep
-from stickslip.sweep.sample import LEVEL, widest
-from stickslip.sweep.summary import influences, within
-from stickslip.sweep.tune import Tuned, front
+from stickslip.studies.planned_run import PlannedRun
+from stickslip.sweeps.dataset import read
+from stickslip.sweeps.gains import GAIN, recommended
+from stickslip.sweeps.plan import Sweep
+from stickslip.sweeps.sample import LEVEL, widest
+from stickslip.sweeps.summary import influences, within
+from stickslip.sweeps.tune import Tuned, front
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LEVELS = 13

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from stickslip.spec import Field
-from stickslip.study.planned_run import PlannedRun
-from stickslip.sweep.numbers import INERTIA, parts
+from stickslip.studies.planned_run import PlannedRun
+from stickslip.sweeps.numbers import INERTIA, parts
 
 METRICS = {
     "position_rms": "RMS position error", "position_peak": "peak position error",

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identify.estimate import Identification, Picture, Trace
-from stickslip.identify.monte_carlo import resisting_torque
+from stickslip.identification.estimate import Identification, Picture, Trace
+from stickslip.identification.monte_carlo import resisting_torque
 from stickslip.report.plots import envelope, quantity
 from stickslip.report.sliding_torque import Sliding
 

@@ -13,8 +13,8 @@ from stickslip.control.files import read_controller
 from stickslip.errors import InputError, UnknownName
 from stickslip.messages import name_option
 from stickslip.model import Model
-from stickslip.recommend.beside import Own
-from stickslip.recommend.candidate_run import Drive
+from stickslip.recommendation.beside import Own
+from stickslip.recommendation.candidate_run import Drive
 
 Given = Controller | str | os.PathLike[str]
 """A name of the catalogue, a controller, or the path of a TOML file with a table [controller]."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 
 from stickslip.arguments import arguments_checked
-from stickslip.identify.compare.change import Comparison, compare_models
-from stickslip.identify.identified_file import Identified, read_identified
+from stickslip.identification.compare.change import Comparison, compare_models
+from stickslip.identification.identified_file import Identified, read_identified
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import require
 

@@ -9,7 +9,7 @@ from typing import Unpack
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
-from stickslip.identify.doctor import Diagnosis, examine
+from stickslip.identification.doctor import Diagnosis, examine
 from stickslip.messages import name_option
 from stickslip.readers.cut import file_rows, pieces, range_words
 from stickslip.verbs.reading import Log, Reading, open_log

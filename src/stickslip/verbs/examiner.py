@@ -9,8 +9,8 @@ from typing import Any, cast
 from stickslip.errors import InputError
 from stickslip.finding import Finding
 from stickslip.identification.memo import EstimateSliding
-from stickslip.identify.doctor import Diagnosis, examine, of_arrays
-from stickslip.identify.doctor.steady_table import is_steady_table
+from stickslip.identification.doctor import Diagnosis, examine, of_arrays
+from stickslip.identification.doctor.steady_table import is_steady_table
 from stickslip.messages import render
 from stickslip.readers.cut import pieces
 from stickslip.readers.remembered import CODES

@@ -17,18 +17,18 @@ from stickslip.config import Document, Table, read_toml
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.errors import InputError, unwritable
-from stickslip.export import CONTROLLER_TARGETS, TARGETS, controller_target, target_named
-from stickslip.export.controllers import what_it_is
-from stickslip.export.job import Check, Export, Job
-from stickslip.export.maps import MAP_TARGETS, MapTarget, map_target, written
-from stickslip.export.target import Target, settings_of
+from stickslip.exports import CONTROLLER_TARGETS, TARGETS, controller_target, target_named
+from stickslip.exports.controllers import what_it_is
+from stickslip.exports.job import Check, Export, Job
+from stickslip.exports.maps import MAP_TARGETS, MapTarget, map_target, written
+from stickslip.exports.target import Target, settings_of
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.rigid import RigidAxis
 from stickslip.messages import name_option, rendered, units_of_axis
 from stickslip.model import Model
 from stickslip.rules import with_article
 from stickslip.spec import Surroundings
-from stickslip.study.study import load_run
+from stickslip.studies.study import load_run
 from stickslip.verbs import own_files
 from stickslip.verbs.export_compensator import CompensatorOptions, compensator_of, recommendation_in
 from stickslip.verbs.export_maps import map_in, only_map
@@ -149,8 +149,8 @@ def export(
     source : IdentificationResult, RecommendationResult, Model, Controller, PositionMap or path
         A path is that of model.toml, recommended.toml or, with `controller`, a `stickslip simulate` file.
     to : str
-        The target, one of `stickslip.export.TARGETS`: "c99", "arduino", "st", "fmu", ...; of a map over the angle one
-        of `stickslip.export.maps.MAP_TARGETS`: "c99", "moteus", "odrive", "vesc", "st", ...
+        The target, one of `stickslip.exports.TARGETS`: "c99", "arduino", "st", "fmu", ...; of a map over the angle one
+        of `stickslip.exports.maps.MAP_TARGETS`: "c99", "moteus", "odrive", "vesc", "st", ...
     folder : path, optional
         Where the files are written; without it they are in ``files`` of the result alone.
     name : str, optional

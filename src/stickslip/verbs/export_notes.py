@@ -9,10 +9,10 @@ from typing import Any, cast
 from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.control.recommended import Recommended, recommended_in
-from stickslip.export.controllers import depends_on, given_by
-from stickslip.export.job import Job
-from stickslip.export.nearest import read_by
-from stickslip.export.target import Target
+from stickslip.exports.controllers import depends_on, given_by
+from stickslip.exports.job import Job
+from stickslip.exports.nearest import read_by
+from stickslip.exports.target import Target
 from stickslip.machines.angle import AngleMap
 from stickslip.messages import axis_unit, name_option
 

@@ -20,11 +20,11 @@ from stickslip.config import Table
 from stickslip.errors import InputError
 from stickslip.extras import needed
 from stickslip.finding import Finding
-from stickslip.identify.doctor.steady_table import is_steady_table
-from stickslip.identify.estimate import Estimate, Held, Identification, Picture
-from stickslip.identify.identified_file import Identified, identified_in
-from stickslip.identify.model_file import in_memory, model_content, versions, write_model
-from stickslip.identify.motion import motion_of, speeds_in, speeds_of
+from stickslip.identification.doctor.steady_table import is_steady_table
+from stickslip.identification.estimate import Estimate, Held, Identification, Picture
+from stickslip.identification.identified_file import Identified, identified_in
+from stickslip.identification.model_file import in_memory, model_content, versions, write_model
+from stickslip.identification.motion import motion_of, speeds_in, speeds_of
 from stickslip.machines.identified import identified_machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.position_map import PositionMap
@@ -47,7 +47,7 @@ class IdentificationResult:
 
     Attributes
     ----------
-    identification : stickslip.identify.estimate.Identification
+    identification : stickslip.identification.estimate.Identification
         The result of the method, with its correlation, pictures and details.
     sources : tuple of Source
         The records as they were used, with what the doctor found.

@@ -19,14 +19,14 @@ from stickslip.control.own_loop import ReferenceVelocity, loop_text
 from stickslip.errors import InputError
 from stickslip.finding import Finding, sorted_findings
 from stickslip.identification.memo import SlidingMemo
-from stickslip.identify.doctor import Diagnosis
-from stickslip.identify.doctor.steady_table import is_steady_table
-from stickslip.identify.estimate import Identification, silent
-from stickslip.identify.evidence import without_inverted_rest
-from stickslip.identify.experiment import DRIVES
-from stickslip.identify.held import held_in
-from stickslip.identify.methods import method_named, methods_by_option
-from stickslip.identify.methods.method import Method, Options, given_in
+from stickslip.identification.doctor import Diagnosis
+from stickslip.identification.doctor.steady_table import is_steady_table
+from stickslip.identification.estimate import Identification, silent
+from stickslip.identification.evidence import without_inverted_rest
+from stickslip.identification.experiment import DRIVES
+from stickslip.identification.held import held_in
+from stickslip.identification.methods import method_named, methods_by_option
+from stickslip.identification.methods.method import Method, Options, given_in
 from stickslip.messages import name_loop, name_option, name_parameter, render, units_of_axis
 from stickslip.model import Model
 from stickslip.readers.convert import pendulum_before_gear
@@ -92,9 +92,9 @@ def identify(
     *logs : path, data frame, mapping of arrays, or Record
         Fitted together; none where arrays are given by name (`t`, `position`, `torque`, ...).
     method : str
-        One of `stickslip.identify.methods.METHODS`: "axis" (inertia, offset or gravity and friction jointly, from any
-        motion), "sliding" (constant velocities, a table of velocity and torque without times, or an axis that coasts
-        with its `inertia` given), "breakaway" (torque ramps), "presliding" and "attraction" (GMS),
+        One of `stickslip.identification.methods.METHODS`: "axis" (inertia, offset or gravity and friction jointly, from
+        any motion), "sliding" (constant velocities, a table of velocity and torque without times, or an axis that
+        coasts with its `inertia` given), "breakaway" (torque ramps), "presliding" and "attraction" (GMS),
         "hysteresis" (a measured friction along its motion), "lugre" (sigma0, sigma1), "inertia" (frequency response),
         "cogging" (torque or current over the angle).
     law : str, Law or sequence of these, optional

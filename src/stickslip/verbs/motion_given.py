@@ -13,16 +13,16 @@ import numpy as np
 
 from stickslip.errors import InputError
 from stickslip.finding import Finding
-from stickslip.identify.doctor import timing, units
-from stickslip.identify.doctor.view import View
-from stickslip.identify.motion import REFERENCES, Motion, motion_of
+from stickslip.identification.doctor import timing, units
+from stickslip.identification.doctor.view import View
+from stickslip.identification.motion import REFERENCES, Motion, motion_of
 from stickslip.messages import name_option, render
 from stickslip.model import Reference
 from stickslip.readers import profiles, remembered
 from stickslip.readers.convert import Drive
 from stickslip.readers.derive import positioned
 from stickslip.readers.reading import CHANNELS, open_table, record_of
-from stickslip.recommend.course import measured
+from stickslip.recommendation.course import measured
 from stickslip.record import Record
 from stickslip.verbs.kinds import require
 from stickslip.verbs.reading import Log, Reading, open_log

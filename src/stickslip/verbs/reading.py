@@ -381,7 +381,7 @@ def _cut(record: Record, reading: Reading) -> Record:
         ),
     )
     if len(out) < len(ranges):
-        from stickslip.identify.doctor.spikes import spike_rows
+        from stickslip.identification.doctor.spikes import spike_rows
 
         part = cut(part, Cut(leave_out=tuple((n, n) for n in spike_rows(part).tolist())))
     return part

@@ -18,16 +18,16 @@ from stickslip.control.files import read_controller, sample_time_in
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import ReferenceVelocity, kind_of_loop, loop_text, split_loop
 from stickslip.errors import InputError
-from stickslip.identify.identified_file import Identified
+from stickslip.identification.identified_file import Identified
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.messages import name_loop, name_option
 from stickslip.model import Model, Reference
-from stickslip.recommend import recommend as setting
-from stickslip.recommend.candidate_run import Drive
-from stickslip.recommend.resolution import encoder_for
-from stickslip.recommend.sample_time import refuse_filter, sample_time_for
+from stickslip.recommendation import recommend as setting
+from stickslip.recommendation.candidate_run import Drive
+from stickslip.recommendation.resolution import encoder_for
+from stickslip.recommendation.sample_time import refuse_filter, sample_time_for
 from stickslip.verbs.candidates_given import Given, compensators_of, made_for
 from stickslip.verbs.compare import IdentifiedModel, identified_of
 from stickslip.verbs.motion_given import Given as MotionGiven

@@ -15,12 +15,12 @@ from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.errors import InputError
-from stickslip.identify.identified_file import Identified
-from stickslip.identify.model_file import versions
+from stickslip.identification.identified_file import Identified
+from stickslip.identification.model_file import versions
 from stickslip.model import Model
-from stickslip.recommend.axes import plants_of
-from stickslip.recommend.file import setting_table, write_setting
-from stickslip.recommend.recommend import Candidate, Recommendation
+from stickslip.recommendation.axes import plants_of
+from stickslip.recommendation.file import setting_table, write_setting
+from stickslip.recommendation.recommend import Candidate, Recommendation
 from stickslip.report.recommendation_text import (
     instead_lines,
     recommendation_lines,
@@ -44,8 +44,8 @@ class RecommendationResult:
 
     Attributes
     ----------
-    recommendation : stickslip.recommend.recommendation.Recommendation
-    identified : stickslip.identify.identified_file.Identified
+    recommendation : stickslip.recommendation.recommendation.Recommendation
+    identified : stickslip.identification.identified_file.Identified
         What it was made for.
     """
 

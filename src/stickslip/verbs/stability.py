@@ -17,7 +17,7 @@ from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.model import Model
-from stickslip.recommend.plant import Plant
+from stickslip.recommendation.plant import Plant
 
 
 @arguments_checked

@@ -11,10 +11,10 @@ from typing import Any
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
 from stickslip.messages import name_option
-from stickslip.study import study as studies
-from stickslip.study.bench import is_bench
-from stickslip.study.plan import Study, load, select
-from stickslip.study.result import StudyResult
+from stickslip.studies import study as studies
+from stickslip.studies.bench import is_bench
+from stickslip.studies.plan import Study, load, select
+from stickslip.studies.result import StudyResult
 from stickslip.verbs.plain_given import file_of, insist_on_folder
 from stickslip.verbs.study_given import study_tables
 
@@ -38,8 +38,8 @@ def study(
     Parameters
     ----------
     file : path, Study or mapping
-        A TOML file, "thesis", "imperfections" or "thesis-rig", or what `stickslip.study.plan.load` gave. Or the content
-        of such a file as a mapping, in which objects may stand for its tables::
+        A TOML file, "thesis", "imperfections" or "thesis-rig", or what `stickslip.studies.plan.load` gave. Or the
+        content of such a file as a mapping, in which objects may stand for its tables::
 
             {
                 "axis": ss.RigidAxis(4e-4, friction),  # or "machines": {"mill": ss.Machine(...)}
@@ -114,7 +114,7 @@ def study_of(
     if is_bench(os.fspath(file)):
         raise InputError(
             f"{shown or os.fspath(file)} is a bench of compensators, not a study; run `stickslip study "
-            f"{'FILE' if shown else os.fspath(file)}` (Python: stickslip.study.bench.run_bench)"
+            f"{'FILE' if shown else os.fspath(file)}` (Python: stickslip.studies.bench.run_bench)"
         )
     return load(os.fspath(file), given=given, shown=shown)
 

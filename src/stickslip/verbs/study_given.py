@@ -22,7 +22,7 @@ from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.machines.written import tables_of
 from stickslip.model import Reference, level_of_caller
-from stickslip.study.plan import BUILT_IN, Study
+from stickslip.studies.plan import BUILT_IN, Study
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.laws_given import MODEL, HeldLaws, friction_table, insist_on_home, model_of, model_table
 from stickslip.verbs.plain_given import PLAIN, Place, absolute, mapping_at, plain

@@ -15,13 +15,13 @@ from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.capacity import insist_on_jobs
 from stickslip.errors import InputError
 from stickslip.extras import needed
-from stickslip.identify.estimate import silent
+from stickslip.identification.estimate import silent
 from stickslip.messages import name_option
-from stickslip.sweep import dataset, execute
-from stickslip.sweep.gains import too_few
-from stickslip.sweep.plan import MOST_CASES, Sweep, load
-from stickslip.sweep.sample import LEVEL
-from stickslip.sweep.summary import summarise, summary_lines, unvaried, write_summary
+from stickslip.sweeps import dataset, execute
+from stickslip.sweeps.gains import too_few
+from stickslip.sweeps.plan import MOST_CASES, Sweep, load
+from stickslip.sweeps.sample import LEVEL
+from stickslip.sweeps.summary import summarise, summary_lines, unvaried, write_summary
 from stickslip.verbs.plain_given import file_of, insist_on_folder
 from stickslip.verbs.study_given import sweep_tables
 
@@ -40,7 +40,7 @@ class SweepResult:
 
     Attributes
     ----------
-    sweep : stickslip.sweep.plan.Sweep
+    sweep : stickslip.sweeps.plan.Sweep
     folder : Path
         Where the data set, manifest.json and summary.csv are.
     rows : sequence of mapping
@@ -136,7 +136,7 @@ def sweep(
     Parameters
     ----------
     file : path, Sweep or mapping
-        A TOML file, "thesis-robustness" or "thesis-gain", or what `stickslip.sweep.plan.load` gave. Or the content of
+        A TOML file, "thesis-robustness" or "thesis-gain", or what `stickslip.sweeps.plan.load` gave. Or the content of
         such a file as a mapping, in which ``study`` may be a mapping as `study` takes it, and ``model`` what `identify`
         returned. The folder keeps all this as a file in ``inputs/``.
     folder : path, optional

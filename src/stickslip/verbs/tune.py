@@ -9,11 +9,11 @@ from typing import Any
 
 from stickslip.arguments import arguments_checked
 from stickslip.errors import InputError
-from stickslip.study.files import claim_folder, copy_inputs
-from stickslip.sweep.plan import Sweep, load
-from stickslip.sweep.tune import Tuned
-from stickslip.sweep.tune import tune as search
-from stickslip.sweep.tuned_files import write
+from stickslip.studies.files import claim_folder, copy_inputs
+from stickslip.sweeps.plan import Sweep, load
+from stickslip.sweeps.tune import Tuned
+from stickslip.sweeps.tune import tune as search
+from stickslip.sweeps.tuned_files import write
 from stickslip.verbs.plain_given import file_of
 from stickslip.verbs.study_given import sweep_tables
 
@@ -33,7 +33,7 @@ def tune(
     Parameters
     ----------
     file : path, Sweep or mapping
-        A sweep's TOML file with a table [tune], or what `stickslip.sweep.plan.load` made of it. Or the content of such
+        A sweep's TOML file with a table [tune], or what `stickslip.sweeps.plan.load` made of it. Or the content of such
         a file as a mapping, as `sweep` takes it; the folder then keeps it in ``inputs/``.
     folder : path, optional
         Where tables and figures are written; nothing is written without it.

@@ -48,7 +48,7 @@ def answered(request: Mapping[str, Any], path: Path) -> dict[str, Any]:
 def simulated(path: Path) -> dict[str, Any]:
     """Return channels, thinned for a picture, and metrics of a `stickslip simulate` file, as computed by that
     command."""
-    from stickslip.study.study import execute, load_run
+    from stickslip.studies.study import execute, load_run
 
     planned = load_run(path)
     planned.check()

@@ -60,7 +60,7 @@ def model_behind(project: Project, setting: Item) -> Item | None:
 
 def described() -> list[dict[str, Any]]:
     """Return all targets with description, content and settings."""
-    from stickslip.export import CONTROLLER_TARGETS, TARGETS, target_named
+    from stickslip.exports import CONTROLLER_TARGETS, TARGETS, target_named
 
     out: list[dict[str, Any]] = []
     for target in (target_named(name) for name in TARGETS):

@@ -165,7 +165,7 @@ def identify_options(data: dict[str, Any]) -> dict[str, Any]:
     ------
     Refused
     """
-    from stickslip.identify.methods import METHODS
+    from stickslip.identification.methods import METHODS
     from stickslip.plugins import law_names
 
     out: dict[str, Any] = {"method": chosen_names([data.get("method", "axis")], "method", tuple(METHODS))[0]}

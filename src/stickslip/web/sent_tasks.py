@@ -38,7 +38,7 @@ def look(request: Request, say: Said) -> dict[str, Any]:
 
 def model_of(item: Item, path: Path) -> dict[str, Any]:
     """Return the description of a model in a file for the page."""
-    from stickslip.identify.identified_file import read_identified
+    from stickslip.identification.identified_file import read_identified
 
     found = read_identified(path)
     if (
@@ -65,7 +65,7 @@ def model_of(item: Item, path: Path) -> dict[str, Any]:
 
 def study_of(path: Path) -> dict[str, Any]:
     """Return a description of what a study or simulation runs."""
-    from stickslip.study.study import load, load_run
+    from stickslip.studies.study import load, load_run
     from stickslip.verbs.kinds import kind_of
 
     if kind_of(path) == "simulation":
@@ -97,7 +97,7 @@ def simulation(path: Path) -> dict[str, Any]:
 def study(path: Path, item: Item, say: Said) -> dict[str, Any]:
     """Return the table of a study; its report is in the same folder."""
     from stickslip.report import write
-    from stickslip.study import study as studies
+    from stickslip.studies import study as studies
 
     def progress(done: int, of: int) -> None:
         say({"tell": f"{done} of {of} runs", "part": done / max(of, 1)})

@@ -1,7 +1,7 @@
 """Sliding: the velocities of thesis (4.1) and (4.3) in descending order, 380 degrees each, in both directions.
 
 A PID keeps each velocity as a ramp of the position (the thesis used an H-infinity controller). The torque of a
-revolution is averaged by `stickslip.identify.sliding.segments`; the first 20 degrees are its transient.
+revolution is averaged by `stickslip.identification.steady_friction.segments`; the first 20 degrees are its transient.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ instead of ringing, and a fit may try any stiffness. A law whose torque jumps at
 while the impulse of the stage lies within what it withstands.
 
 The functions below are of the scalar subset. What they call of the contact (`recorded_input.contact`) is theirs who run
-them: addresses of a compiled law here, the printed law in C (`stickslip.export.fmu_axis`).
+them: addresses of a compiled law here, the printed law in C (`stickslip.exports.fmu_axis`).
 """
 
 from __future__ import annotations

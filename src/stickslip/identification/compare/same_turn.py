@@ -1,0 +1,33 @@
+"""The angle at which a pendulum hangs, known but for whole turns, in two models: told in one turn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip.identification.identified_file import Identified
+
+ANGLE = "gravity_angle"
+"""rad. It has no zero of its own: neither per cent nor logarithms mean anything."""
+
+
+def in_one_turn(first: Identified, second: Identified) -> Identified:
+    """The second, its angle turned by whole turns to within half a turn of the first one's."""
+    angles = [e.value for m in (first, second) for e in m.estimates if e.name == ANGLE]
+    if len(angles) < 2 or not all(map(math.isfinite, angles)):
+        return second
+    by = math.tau * round((angles[0] - angles[1]) / math.tau)
+    estimates = tuple(
+        replace(e, value=e.value + by, lower=e.lower + by, upper=e.upper + by) if e.name == ANGLE else e
+        for e in second.estimates
+    )
+    return replace(second, estimates=estimates)
+
+
+def without_angle(found: Identified) -> Identified:
+    """The model without that angle: brought through a gear, it has whole turns of another shaft."""
+    kept = [k for k, e in enumerate(found.estimates) if e.name != ANGLE]
+    correlation = found.correlation[np.ix_(kept, kept)]
+    return replace(found, estimates=tuple(found.estimates[k] for k in kept), correlation=correlation)

@@ -1,0 +1,56 @@
+"""What doubts a unit or a sign that a profile says: that it is the profile's, and how to read a file without it.
+
+A profile holds for files with the same names of columns; those of another drive may have the names and other units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from stickslip.finding import Finding
+from stickslip.identification.doctor.view import View
+from stickslip.messages import name_columns, name_option
+
+MOTION, DRIVEN = ("position", "velocity", "time"), ("motor_torque", "current", "friction_torque")
+CONCERNS = {
+    "position-unit": MOTION, "velocity-unit": MOTION, "time-unit": MOTION, "velocity-mismatch": MOTION,
+    "velocity-sign": ("velocity", "position"), "position-reference-unit": ("position_reference", "position"),
+    "reference-scale": ("position_reference", "position"), "torque-sign": (*DRIVEN, "position", "velocity"),
+    "torque-unit": DRIVEN, "torque-magnitude": DRIVEN,
+}  # fmt: skip
+"""Channels whose units a finding doubts, by its code."""
+
+
+def told(findings: Sequence[Finding], view: View) -> list[Finding]:
+    """The findings; those that doubt what a profile says have it in their words."""
+    return [_told(finding, view) for finding in findings]
+
+
+def _told(finding: Finding, view: View) -> Finding:
+    # A current that makes the torque is doubted with it, one beside it is not.
+    beside = {"current"} if "motor_torque" in view.columns else set[str]()
+    by = [c for c in CONCERNS.get(finding.code, ()) if c not in beside and c in view.columns]
+    by = [c for c in by if view.columns[c].by_profile]
+    if not by:
+        return finding
+    saved = bool(_reading(view).get("saved_profile"))
+    whose = "a saved profile, found by the names of the columns," if saved else "the profile"
+    units = " and ".join(f"{c} in {view.columns[c].unit}" for c in by)
+    without = name_columns(**{c: view.name(c) for c in by})
+    also = f"; {name_option('profile', 'NEW.toml')} leaves out all that it says" if saved else ""
+    message = f"{finding.message}; {whose} says {units}"
+    remedy = f"{finding.remedy}, or {without} to leave that out{also}"
+    turned = [c for c in by if view.columns[c].unit.startswith("-")]
+    if turned and finding.code.endswith("-sign"):
+        # What was said for another file is doubted before this one.
+        profile = f"the profile {_reading(view)['saved_profile']}" if saved else "the profile"
+        undo = "delete that file" if saved else "correct it there"
+        whether = "if this log's own sign is right"
+        remedy = f"{profile} turned the sign of {' and '.join(turned)}: {undo}, {whether}; else {remedy}"
+    return replace(finding, message=message, remedy=remedy)
+
+
+def _reading(view: View) -> dict[str, Any]:
+    return view.record.meta.get("reading", {})
