@@ -19,9 +19,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 from ordinary_logs import IMPERFECTIONS, MOTIONS, RATES, draw
+from stickslip.core.record import Record
 from stickslip.identification.doctor.play import DeadTravel, dead_travel
 from stickslip.identification.doctor.view import View
-from stickslip.record import Record
 
 UNITS = {"position": "rad", "motor_torque": "N·m"}
 

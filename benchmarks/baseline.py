@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from stickslip.jit import kernel
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation._forcing import CELL_SIZE
 from stickslip.simulation.case_arrays import FROM_MEASUREMENT, FROM_REFERENCE, KI, SOURCE, Case
 from stickslip.simulation.exact import engine as exact

@@ -24,7 +24,7 @@ import numba  # noqa: E402
 import numpy as np  # noqa: E402
 
 import stickslip as ss  # noqa: E402
-from stickslip.errors import StickslipError  # noqa: E402
+from stickslip.core.errors import StickslipError  # noqa: E402
 
 STEP, EVERY = 5e-5, 20
 """s; steps in a sample."""

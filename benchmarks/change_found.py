@@ -17,7 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from coverage_records import make
-from stickslip.errors import StickslipError
+from stickslip.core.errors import StickslipError
 from stickslip.identification.axis import identify_axis
 from stickslip.identification.compare.change import compare_models
 from stickslip.identification.experiment import experiment_of

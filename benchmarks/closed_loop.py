@@ -37,7 +37,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.jit import kernel
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation import _forcing
 from stickslip.simulation.case_arrays import lay_out
 from stickslip.simulation.closed_loop import simulate

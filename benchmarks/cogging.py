@@ -23,6 +23,7 @@ import numpy as np
 
 import stickslip as ss
 from stickslip.control.position import position_feedforward
+from stickslip.core.record import Record
 from stickslip.identification.cogging import identify_cogging
 from stickslip.identification.cogging.fitting import fit
 from stickslip.identification.cogging.orders import grid_of, moving_columns, path
@@ -34,7 +35,6 @@ from stickslip.machines.files import machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Harmonics
 from stickslip.machines.position_map import PositionMap
-from stickslip.record import Record
 from stickslip.rigs.loop_sample import Control
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.cogging import Cogging

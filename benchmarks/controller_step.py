@@ -19,7 +19,7 @@ import numpy as np
 from stickslip.control.catalogue import Belief, compensated
 from stickslip.control.controller import Controller
 from stickslip.exports.c99_controller import write
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 STEPS, BLOCKS = 20_000, 41
 MOTIONS = {"fast": 1.0, "slow": 0.03}

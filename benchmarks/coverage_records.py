@@ -17,9 +17,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from stickslip.control.linear import place
-from stickslip.model import Model
-from stickslip.plugins import law
-from stickslip.record import Record
+from stickslip.core.record import Record
+from stickslip.models.model import Model
+from stickslip.models.plugins import law
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 __all__ = ["FAMILIES", "Case", "make"]

@@ -15,10 +15,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from stickslip import plugins
 from stickslip.exports import c99
 from stickslip.exports.job import Job
-from stickslip.model import Model
+from stickslip.models import plugins
+from stickslip.models.model import Model
 
 HERE = Path(__file__).parent
 STEPS, BLOCKS = 20_000, 41

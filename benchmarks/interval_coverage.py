@@ -30,7 +30,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 from coverage_records import make  # noqa: E402
-from stickslip.errors import StickslipError  # noqa: E402
+from stickslip.core.errors import StickslipError  # noqa: E402
 from stickslip.identification.axis import identify_axis  # noqa: E402
 from stickslip.identification.experiment import experiment_of  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402

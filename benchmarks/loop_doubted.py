@@ -19,8 +19,8 @@ import numpy as np
 
 import coverage_records as records
 from stickslip.control.linear import place
-from stickslip.identification.output_error.loop_check import shown_gains
 from stickslip.identification.experiment import Experiment
+from stickslip.identification.output_error.loop_check import shown_gains
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 KINDS = ("as seen", "rounded", "late", "reference late", "every fifth row")

@@ -28,10 +28,10 @@ import numpy as np  # noqa: E402
 
 import ordinary_logs as logs  # noqa: E402
 from ordinary_coverage import AXIS, cells  # noqa: E402
-from stickslip.errors import StickslipError  # noqa: E402
+from stickslip.core.errors import StickslipError  # noqa: E402
+from stickslip.identification.experiment import Experiment  # noqa: E402
 from stickslip.identification.search import Asked  # noqa: E402
 from stickslip.identification.sliding import estimate_sliding  # noqa: E402
-from stickslip.identification.experiment import Experiment  # noqa: E402
 
 NAMES = ("inertia", "fc", "sigma2")
 BAR = 1.5

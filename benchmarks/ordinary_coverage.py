@@ -29,10 +29,10 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 import ordinary_logs as logs  # noqa: E402
-from stickslip.errors import StickslipError  # noqa: E402
+from stickslip.core.errors import StickslipError  # noqa: E402
 from stickslip.identification.axis import identify_axis  # noqa: E402
-from stickslip.identification.sliding import estimate_sliding  # noqa: E402
 from stickslip.identification.experiment import Experiment  # noqa: E402
+from stickslip.identification.sliding import estimate_sliding  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402
 
 AXIS = ServoAxis(drive_side="load")

@@ -35,12 +35,12 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np  # noqa: E402
 
-from stickslip.errors import StickslipError  # noqa: E402
+from stickslip.core.errors import StickslipError  # noqa: E402
 from stickslip.identification.axis import identify_axis  # noqa: E402
-from stickslip.identification.sliding import estimate_sliding  # noqa: E402
 from stickslip.identification.experiment import Experiment  # noqa: E402
 from stickslip.identification.regression.force_error import force_error_on, plain_error_on  # noqa: E402
 from stickslip.identification.regression.inverse import inverse_dynamics  # noqa: E402
+from stickslip.identification.sliding import estimate_sliding  # noqa: E402
 from stickslip.machines.servo import ServoAxis  # noqa: E402
 
 DATA = Path(os.environ.get("STICKSLIP_DATA", "../shared/data"))

@@ -19,8 +19,8 @@ import numpy as np
 from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
+from stickslip.core.record import Record
 from stickslip.machines.files import machine
-from stickslip.record import Record
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Capabilities, setpoints
 from stickslip.rigs.virtual import VirtualRig

@@ -23,7 +23,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.jit import call_guards, call_rate, call_switch, compiled_law, flat, kernel, pointer
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.adaptive.dormand_prince import NODES, TABLEAU
 from stickslip.simulation.adaptive.hybrid import rates
 from stickslip.simulation.adaptive.layout import HEAD, Laid, loop_of

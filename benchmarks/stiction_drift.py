@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 
 CONTACT = {"sigma0": 1e5, "sigma1": 10.0, "sigma2": 0.4, "fc": 1.0, "fs": 1.5, "vs": 1e-3}

@@ -32,7 +32,7 @@ from playwright.sync_api import sync_playwright
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import stickslip
-from stickslip.record import Record
+from stickslip.core.record import Record
 from support.serving import QUIET, Served, drop, ended, start_server, stop_server
 from support.web_logs import LOGS
 

@@ -22,7 +22,7 @@ from solver_comparison import INERTIA, PLANT, bdf, closed, timed
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Reference
+from stickslip.models.model import Reference
 from stickslip.report.plots import Curve, Panel, draw
 from stickslip.report.styles import Style
 from stickslip.simulation.closed_loop import prepare, simulate

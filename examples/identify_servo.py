@@ -24,11 +24,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from stickslip import plugins
 from stickslip.identification.axis import identify_axis
-from stickslip.identification.output_error.output import Extras, OutputError, output_error
 from stickslip.identification.experiment import Experiment
+from stickslip.identification.output_error.output import Extras, OutputError, output_error
 from stickslip.machines.servo import Motor, ServoAxis
+from stickslip.models import plugins
 from stickslip.simulation.recorded_input.simulation import Loop
 
 SUPPLY = 7.4  # V

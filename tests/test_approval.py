@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 import stickslip as ss
-from stickslip.approval import approved_file
 from stickslip.cli import main
-from stickslip.errors import CodeRefused
+from stickslip.core.code_approval import approved_file
+from stickslip.core.errors import CodeRefused
 from stickslip.identification.identified_file import read_identified
 from stickslip.machines.files import machine
 from stickslip.rigs.files import read_rig
@@ -152,7 +152,7 @@ def test_a_law_named_on_the_command_line_is_approved(sent, capsys, monkeypatch):
 
 def forget(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in another process."""
-    monkeypatch.setattr("stickslip.approval._ran", set())
+    monkeypatch.setattr("stickslip.core.code_approval._ran", set())
 
 
 def test_compiled_code_beside_an_approved_file_does_not_run(sent):

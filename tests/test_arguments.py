@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.motor import Amplifier
 

@@ -89,7 +89,7 @@ def test_functions_of_one_text_are_compiled_once():
 
 LAW = """
 from stickslip.jit import compiled_law
-from stickslip.plugins import law
+from stickslip.models.plugins import law
 compiled_law(law("coulomb"))
 """
 
@@ -156,7 +156,8 @@ def test_a_simulation_loads_nothing_that_compiles_either():
 
 NAMES = """
 import hashlib
-from stickslip import jit, plugins
+from stickslip import jit
+from stickslip.models import plugins
 from stickslip.jit import entries
 from stickslip.laws import LAWS
 from stickslip.simulation.recorded_input.branchless import NotStraight, Trace

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from stickslip.config import Document, Table, read_toml
-from stickslip.errors import ConfigError, InputError, ModelRemark
+from stickslip.core.config import Document, Table, read_toml
+from stickslip.core.errors import ConfigError, InputError, ModelRemark
 from stickslip.studies.plan import load, load_run
 
 DATA = Path(__file__).parent / "data"
@@ -175,7 +175,7 @@ def one_line(message: str) -> bool:
 
 def loads_or_is_refused(load: Any, name: str, tree: dict[str, Any], folder: Path, monkeypatch: Any) -> str:
     """What is said of a changed file: "fine", or why it is refused."""
-    monkeypatch.setattr("stickslip.config.tomllib.loads", lambda text: tree)
+    monkeypatch.setattr("stickslip.core.config.tomllib.loads", lambda text: tree)
     message = "fine"
     try:
         load(folder / name)

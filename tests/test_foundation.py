@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 import stickslip
-from stickslip import errors
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, pd, place
-from stickslip.errors import InputError, ParameterError, UnknownName
+from stickslip.core import errors
+from stickslip.core.errors import InputError, ParameterError, UnknownName
+from stickslip.core.record import Record
 from stickslip.laws.gms import LAW as GMS
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models.model import Model
 
 
 def test_every_public_name_loads():
@@ -169,7 +169,7 @@ def test_record_errors(tmp_path):
 
 
 def test_meta_of_a_run_is_plain_data():
-    from stickslip.model import Reference
+    from stickslip.models.model import Reference
     from stickslip.simulation.closed_loop import simulate
 
     axis = RigidAxis(1e-3, Model("coulomb", fc=0.1))

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip import messages
 from stickslip.cli import main, parser_of
-from stickslip.messages import Reader, Surface, axis_unit, rendered_for, shown_on, units_of_axis
+from stickslip.core import messages
+from stickslip.core.messages import Reader, Surface, axis_unit, rendered_for, shown_on, units_of_axis
 from stickslip.verbs.reading import Reading
 
 SOURCE = Path(ss.__file__).parent

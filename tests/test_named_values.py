@@ -7,8 +7,8 @@ import pytest
 
 from stickslip.analyse.spectrum import spectrum
 from stickslip.cli import main
-from stickslip.errors import InputError
-from stickslip.record import Record
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 
 MODEL = 'law = "coulomb"\n[parameters]\nfc = 0.5\n[axis]\ninertia = 0.02\n'
 SPECTRUM = "analyse spectrum log.csv --channel position"

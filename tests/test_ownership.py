@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from stickslip import approval
-from stickslip.approval import approve, approved_file, demand
-from stickslip.errors import CodeRefused, InputError, UnusedPlace
-from stickslip.ownership import exposure_of
+from stickslip.core import code_approval
+from stickslip.core.code_approval import approve, approved_file, demand
+from stickslip.core.errors import CodeRefused, InputError, UnusedPlace
+from stickslip.core.ownership import exposure_of
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows keeps owners and rights elsewhere")
 FOLDER = "from stickslip.jit import cache_folder; print(cache_folder())"
@@ -68,7 +68,7 @@ def test_approvals_that_others_can_write_count_for_nothing(
     import hashlib
 
     monkeypatch.setenv("STICKSLIP_CONFIG", str(tmp_path / "settings"))
-    monkeypatch.setattr(approval, "_ran", set())
+    monkeypatch.setattr(code_approval, "_ran", set())
     approve("x.py", hashlib.sha256(b"code").hexdigest())
     demand("x.py", b"code", "x.toml: law")
     approved_file().chmod(0o666)

@@ -19,9 +19,10 @@ import pandas
 import pytest
 
 import stickslip as ss
-from stickslip import errors, plugins
+from stickslip.core import errors
 from stickslip.laws import gms
 from stickslip.laws.gms import LAW as RAW
+from stickslip.models import plugins
 from stickslip.simulation.machine.loop import rows_at
 from support.laws import registered, variants
 
@@ -31,7 +32,7 @@ OWN_LAW = '''"""Friction that rises with the root of the speed."""
 import math
 from typing import Annotated, NamedTuple
 
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 
 class Params(NamedTuple):
@@ -56,8 +57,8 @@ OWN_LOOP = '''"""A PD."""
 
 from typing import Annotated, NamedTuple
 
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Par
 
 
 class Params(NamedTuple):
@@ -249,7 +250,7 @@ def test_what_stands_in_no_file_says_so() -> None:
         pickle.dumps(made)
     sent = pickle.dumps(made.coming_from(plugins.completed, RAW))
     assert pickle.loads(sent) is ss.law("gms")
-    lost = "from stickslip.origin import in_module; in_module('nowhere', 'LAW', 'mine')"
+    lost = "from stickslip.core.pickling import in_module; in_module('nowhere', 'LAW', 'mine')"
     found = subprocess.run([sys.executable, "-c", lost], capture_output=True, text=True, check=False)
     assert (
         "LawError: 'mine' was LAW of the module 'nowhere', which has none here; write it in a file"

@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip import plugins
-from stickslip.errors import ParameterError, UnknownName
+from stickslip.core.errors import ParameterError, UnknownName
 from stickslip.jit import compiled_profile, flat
-from stickslip.model import Reference
+from stickslip.models import plugins
+from stickslip.models.model import Reference
 from stickslip.subset import Layout
 
 EXAMPLES = {

@@ -11,9 +11,9 @@ import pytest
 from stickslip.cli import main
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
-from stickslip.errors import ModelRemark, ParameterError
+from stickslip.core.errors import ModelRemark, ParameterError
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 
 RISING = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.2, "fc": 0.285, "vs": 0.01}

@@ -9,8 +9,8 @@ from typing import Annotated, NamedTuple
 import pytest
 
 import stickslip as ss
-from stickslip.errors import LawError
-from stickslip.spec import Field, Par
+from stickslip.core.errors import LawError
+from stickslip.core.spec import Field, Par
 from stickslip.subset import Layout, lower, named
 
 LAYOUTS = {"p": Layout(("a", "b"), ("k", "m"), counted=True), "z": Layout(("x",), ("f", "h"))}
@@ -293,7 +293,7 @@ def test_what_a_laws_file_makes_with_exec_is_not_taken_for_its_lines(tmp_path, a
     """The lines of the file with the same numbers were compiled in its place, or there were none."""
     text = """
 from typing import Annotated, NamedTuple
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 class Params(NamedTuple):
     fc: Annotated[float, Par("N·m", "F_C", "level", positive=True)]
 def step(v0, v1, dt, z, p, u):

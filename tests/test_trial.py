@@ -7,9 +7,10 @@ import sys
 
 import pytest
 
-from stickslip import plugins, trial
 from stickslip.cli import main
-from stickslip.errors import LawError
+from stickslip.core import smoke_test
+from stickslip.core.errors import LawError
+from stickslip.models import plugins
 from support.faulty import END, RATE, dahl
 
 NO_RETURN = dahl((END, END.replace("    return z.force", "        return z.force")))
@@ -86,4 +87,4 @@ def test_the_law_without_a_fault_passes(tmp_path):
 def test_no_registered_law_with_any_option_is_complained_of(name):
     law = plugins.law(name)
     for variant in [law, *(law.having(**{c.name: o}) for c in law.choices for o in c.options)]:
-        assert trial.complaint(variant) == "", variant.chosen
+        assert smoke_test.complaint(variant) == "", variant.chosen

@@ -13,7 +13,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.whole_files import draft_of, prepared_folder, write_whole
+from stickslip.core.whole_files import draft_of, prepared_folder, write_whole
 
 resource = pytest.importorskip("resource", reason="the size of files is limited on POSIX systems only")
 

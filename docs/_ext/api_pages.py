@@ -17,7 +17,7 @@ FURTHER = {
     "stickslip.rigs.loop": ("Loop",),
     "stickslip.rigs.rig": ("RigKind", "Limits", "Capabilities", "Watchdog", "setpoints"),
     "stickslip.rigs.files": ("read_rig",),
-    "stickslip.errors": (),
+    "stickslip.core.errors": (),
 }
 """Modules besides the package's own names, and what of them is shown; () shows the whole module."""
 
@@ -33,8 +33,8 @@ def make() -> None:
     for module, name in shown:
         write(FOLDER / f"{module}.{name}.md", page(module, name))
     write(
-        FOLDER / "stickslip.errors.md",
-        "# stickslip.errors\n\n```{eval-rst}\n.. automodule:: stickslip.errors\n"
+        FOLDER / "stickslip.core.errors.md",
+        "# stickslip.core.errors\n\n```{eval-rst}\n.. automodule:: stickslip.core.errors\n"
         "   :members:\n   :show-inheritance:\n```\n",
     )
     write(FOLDER / "index.md", index(shown))
@@ -60,8 +60,8 @@ def index(shown: list[tuple[str, str]]) -> str:
         said = (inspect.getdoc(found) or "").splitlines()[0].replace("`", "")
         label = f"ss.{name}" if module == "stickslip" else f"{module}.{name}"
         rows.append((f"[`{label}`]({module}.{name}.md)", said))
-    rows.append(("[`stickslip.errors`](stickslip.errors.md)", "The exception tree"))
-    pages = "\n".join([*(f"{module}.{name}" for module, name in shown), "stickslip.errors"])
+    rows.append(("[`stickslip.core.errors`](stickslip.core.errors.md)", "The exception tree"))
+    pages = "\n".join([*(f"{module}.{name}" for module, name in shown), "stickslip.core.errors"])
     return f"""# Python
 
 `import stickslip as ss` costs nothing: every name is loaded when it is first used.

@@ -13,11 +13,11 @@ from pages import GENERATED, ROOT
 
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
+from stickslip.core.record import Record
 from stickslip.machines.contact import Contact
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Harmonics
-from stickslip.model import Model, Reference
-from stickslip.record import Record
+from stickslip.models.model import Model, Reference
 from stickslip.report.plots import Curve, Panel, draw
 from stickslip.report.styles import REFERENCE, Style
 from stickslip.simulation.closed_loop import simulate

@@ -10,16 +10,16 @@ from pathlib import Path
 
 from pages import GENERATED, ROOT, latex, number, prose, table, write
 
-from stickslip import plugins
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Field, Law, fields_of
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models import plugins
+from stickslip.models.model import Model, Reference
 from stickslip.report.law_pictures import draw_gallery, draw_law
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.integrators import INTEGRATORS, integrator_for
-from stickslip.spec import Field, Law, fields_of
 
 FOLDER = GENERATED / "laws"
 KNOWN = {"name", "title", "equation", "passive", "odd", "rate_independent"}

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from pages import GENERATED, latex, table, write
 
-from stickslip import plugins
-from stickslip.spec import fields_of
+from stickslip.core.spec import fields_of
+from stickslip.models import plugins
 
 LOOP = (
     ("theta", "position of the axis", "rad", "position"),

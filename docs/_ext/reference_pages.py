@@ -6,8 +6,8 @@ import numpy as np
 from law_pages import parameters
 from pages import GENERATED, write
 
-from stickslip import plugins
-from stickslip.model import Reference
+from stickslip.models import plugins
+from stickslip.models.model import Reference
 from stickslip.report.plots import Curve, Panel, draw
 from stickslip.report.styles import Style
 

@@ -14,15 +14,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from stickslip.approval import allow_code
     from stickslip.cli.warm_up import warm_up
     from stickslip.control.block import ControlBlock
     from stickslip.control.compensator import Feedback, Feedforward
     from stickslip.control.controller import Controller
     from stickslip.control.linear import Cascade, Gains, pd, pid, place, pr
     from stickslip.control.registry import control_law, control_law_names
-    from stickslip.control_spec import ControlLaw
-    from stickslip.errors import InputError, SimulationError, StickslipError
+    from stickslip.core.code_approval import allow_code
+    from stickslip.core.control_spec import ControlLaw
+    from stickslip.core.errors import InputError, SimulationError, StickslipError
+    from stickslip.core.record import Record
+    from stickslip.core.spec import Law, Mode, Par
     from stickslip.machines.contact import Bearings, Contact, Drift, Heat
     from stickslip.machines.encoder import Encoder
     from stickslip.machines.files import load_machine
@@ -31,12 +33,10 @@ if TYPE_CHECKING:
     from stickslip.machines.motor import Amplifier, Converter, Harmonics
     from stickslip.machines.rigid import RigidAxis
     from stickslip.machines.two_mass import TwoMassAxis
-    from stickslip.model import Model, Reference
-    from stickslip.plugins import law, law_names
-    from stickslip.record import Record
+    from stickslip.models.model import Model, Reference
+    from stickslip.models.plugins import law, law_names
     from stickslip.simulation.closed_loop import simulate
     from stickslip.simulation.prescribed.open_loop import respond
-    from stickslip.spec import Law, Mode, Par
     from stickslip.verbs.compare import compare
     from stickslip.verbs.doctor import doctor
     from stickslip.verbs.export import ExportResult, export
@@ -56,15 +56,15 @@ __version__ = "0.1.0"
 _HOME = {
     name: module
     for module, names in {
-        "approval": "allow_code",
+        "core.code_approval": "allow_code",
         "cli.warm_up": "warm_up",
         "control.block": "ControlBlock",
         "control.compensator": "Feedback Feedforward",
         "control.controller": "Controller",
         "control.linear": "Cascade Gains pd pid place pr",
         "control.registry": "control_law control_law_names",
-        "control_spec": "ControlLaw",
-        "errors": "InputError SimulationError StickslipError",
+        "core.control_spec": "ControlLaw",
+        "core.errors": "InputError SimulationError StickslipError",
         "machines.contact": "Bearings Contact Drift Heat",
         "machines.encoder": "Encoder",
         "machines.files": "load_machine",
@@ -73,13 +73,13 @@ _HOME = {
         "machines.motor": "Amplifier Converter Harmonics",
         "machines.rigid": "RigidAxis",
         "machines.two_mass": "TwoMassAxis",
-        "model": "Model Reference",
-        "plugins": "law law_names",
-        "record": "Record",
+        "models.model": "Model Reference",
+        "models.plugins": "law law_names",
+        "core.record": "Record",
         "report.record_figure": "record_figure",
         "simulation.closed_loop": "simulate",
         "simulation.prescribed.open_loop": "respond",
-        "spec": "Law Mode Par",
+        "core.spec": "Law Mode Par",
         "verbs.compare": "compare",
         "verbs.doctor": "doctor",
         "verbs.export": "ExportResult export",
@@ -158,7 +158,6 @@ __all__ = [
     "tune",
     "warm_up",
 ]
-
 
 
 def __getattr__(name: str) -> Any:

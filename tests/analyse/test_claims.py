@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 from stickslip.thesis.claims import CLAIMS, judge
 from support.places import REFERENCE, needs_reference
 

@@ -20,7 +20,7 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.control.registry import control_law, control_law_names
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.machines.files import machine
 from stickslip.studies.controller_confirmed import confirmed_controller, scaled
 from stickslip.studies.stability_map import moved
@@ -155,8 +155,8 @@ def test_what_is_not_smooth_about_rest_is_refused():
 
 BENT = """from typing import Annotated, NamedTuple
 import math
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Par
 
 
 class Params(NamedTuple):

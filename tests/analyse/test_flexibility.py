@@ -16,7 +16,7 @@ from stickslip.analyse.flexibility import (
     shaft_stiffness,
     twist,
 )
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.drivetrain import Chain
 from stickslip.report.analysis_pictures import picture_of_flexibility
 

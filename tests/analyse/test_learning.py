@@ -12,7 +12,7 @@ from stickslip.analyse.controller_loop import linearised
 from stickslip.analyse.learning import over_angle, over_time, response, widest
 from stickslip.analyse.presliding_loop import Axis
 from stickslip.control.learning import low_pass, low_pass_response, relearned, smoothed
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.machines.drivetrain import Drivetrain
 from support.golden_rows import INERTIA, PD, ROWS
 

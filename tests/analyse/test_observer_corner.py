@@ -10,8 +10,8 @@ import pytest
 from stickslip.analyse.observer_corner import DAMPING, HIGHEST, damped, default_corner, largest_corner, poles
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
-from stickslip.errors import ParameterError
-from stickslip.spec import Surroundings
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Surroundings
 
 INERTIA = 3.8623e-4
 W = 40.0 * np.pi

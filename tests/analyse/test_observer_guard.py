@@ -9,7 +9,7 @@ import pytest
 from stickslip.analyse.observer_guard import largest_stiffness, objection, positive_real_ratios, stuck_radius
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 
 INERTIA, STIFFNESS = 3.8623e-4, 25_000.0  # the thesis's axis and its contact
 W = 40.0 * math.pi

@@ -11,8 +11,8 @@ from stickslip.analyse.dependence import dependence
 from stickslip.analyse.motor_vs_sensor import sides
 from stickslip.analyse.repeatability import repeatability
 from stickslip.analyse.spectrum import spectrum
-from stickslip.errors import InputError
-from stickslip.record import Record
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 
 RATE = 1000.0
 

@@ -14,13 +14,13 @@ from stickslip.analyse.stability import gain_margin, stability
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Surroundings
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
 from stickslip.machines.files import machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.spec import Surroundings
 from support.sampled_text import Memory, sampled_by, settings
 
 J = 4.2757e-4

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.analyse.tracking import METRICS, tracking_metrics
-from stickslip.record import Record
+from stickslip.core.record import Record
 from stickslip.thesis.rig_claims import CLAIMS, MAIN, judge
 
 TIME = np.arange(5000) / 1000.0

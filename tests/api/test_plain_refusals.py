@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import ConfigError, InputError, ParameterError
+from stickslip.core.errors import ConfigError, InputError, ParameterError
 from support.sweeps import SMALL
 
 COULOMB = ss.Model("coulomb", fc=0.3, sigma2=0.02)

@@ -17,7 +17,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.analyse.controller_margins import ControllerStability
-from stickslip.config import Document, Table
+from stickslip.core.config import Document, Table
 from stickslip.exports import target_named
 from stickslip.identification.compare.change import Comparison
 from stickslip.identification.doctor import Diagnosis

@@ -9,7 +9,7 @@ import pytest
 
 from stickslip.cli import main
 from stickslip.cli.analyse import ANALYSES
-from stickslip.record import Record
+from stickslip.core.record import Record
 
 TIME = np.arange(20000) / 1000.0
 TRAIN = ["--stiffness", "17800,396", "--inertia", "1.8e-4,6e-5,1.8757e-4", "--torque", "dry=0.2951"]

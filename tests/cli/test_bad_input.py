@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from stickslip.approval import asked_for
 from stickslip.cli import main
+from stickslip.core.code_approval import asked_for
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -270,7 +270,7 @@ def test_record_that_cannot_be_written(folder: Path, capsys: pytest.CaptureFixtu
 
 LAW = """
 from typing import Annotated, NamedTuple
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 class Params(NamedTuple):
     level: Annotated[float, Par("N·m", "F_0", "level", lower=0.0)]

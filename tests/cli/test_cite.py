@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from stickslip import plugins
 from stickslip.cli import main
+from stickslip.models import plugins
 from stickslip.report.citations import INTEGRATORS, bibliography, cited_by
 
 DATA = Path(__file__).parents[1] / "data"

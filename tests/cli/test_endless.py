@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.identification.presliding.hysteresis import Loop
 from stickslip.identification.presliding.presliding import GRID, identify_presliding
 from stickslip.identification.regression.inverse import refuse_harmonics
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.readers import read
-from stickslip.record import Record
 
 LOG = str(Path(__file__).parents[2] / "src" / "stickslip" / "demo.csv")
 MODEL = (

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from stickslip.cli import _files, main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 DATA = Path(__file__).parents[1] / "data"
 MODEL = (

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import stickslip
-from stickslip import compiling, jit
+from stickslip import jit
 from stickslip.cli import main, parser_of, sweep, warm_up
 from stickslip.control.controller import Controller
+from stickslip.core import compile_notice
 from stickslip.sweeps import forecast
 from stickslip.verbs.recommend import loop_of
 
@@ -39,24 +40,24 @@ class Terminal(io.StringIO):
 @pytest.fixture
 def told(monkeypatch):
     """A notice that hears what is compiled."""
-    monkeypatch.setattr(compiling, "_listeners", [])
-    notice = compiling.Notice(io.StringIO(), Clock)
-    compiling.listen(notice)
+    monkeypatch.setattr(compile_notice, "_listeners", [])
+    notice = compile_notice.Notice(io.StringIO(), Clock)
+    compile_notice.listen(notice)
     return notice
 
 
 def test_a_long_compilation_is_said_once_and_a_short_one_not(told):
-    compiling.started()
+    compile_notice.started()
     short = Clock.last
-    compiling.ended()
+    compile_notice.ended()
     assert short.cancelled
     assert told.stream.getvalue() == ""
     for _ in range(2):
-        compiling.started()
-        compiling.started()
+        compile_notice.started()
+        compile_notice.started()
         Clock.last.ring()
-        compiling.ended()
-        compiling.ended()
+        compile_notice.ended()
+        compile_notice.ended()
     said = told.stream.getvalue()
     assert said.count("\n") == 1
     assert "20 s" in said
@@ -64,7 +65,7 @@ def test_a_long_compilation_is_said_once_and_a_short_one_not(told):
 
 
 def test_a_terminal_sees_how_far_it_is():
-    notice = compiling.Notice(Terminal(), Clock)
+    notice = compile_notice.Notice(Terminal(), Clock)
     notice.started()
     Clock.last.ring()
     notice.ended()
@@ -158,7 +159,7 @@ def test_the_log_that_ships_can_be_had_alone(tmp_path, capsys):
 
 def test_what_warm_up_does_not_know_is_said_to_be_compiled_once(told):
     """It was "`stickslip warm-up` does it beforehand", after a warm-up."""
-    told.started(compiling.OWN_WORDS)
+    told.started(compile_notice.OWN_WORDS)
     told.started()
     Clock.last.ring()
     said = told.stream.getvalue()

@@ -15,10 +15,10 @@ import pytest
 
 from stickslip import Model
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.estimate import Estimate, Identification
 from stickslip.identification.methods.method import Options
-from stickslip.plugins import law_names
+from stickslip.models.plugins import law_names
 from stickslip.verbs.identify import assumptions
 from support import axis_cases as cases
 

@@ -8,7 +8,7 @@ import stickslip as ss
 from stickslip.cli import main
 from stickslip.contract.control_laws import description as control_description
 from stickslip.contract.description import description, required
-from stickslip.errors import UnknownName
+from stickslip.core.errors import UnknownName
 
 
 @pytest.fixture

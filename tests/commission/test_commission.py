@@ -20,7 +20,7 @@ from stickslip.commission.resume import claimed
 from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.errors import InputError, LimitCrossed
+from stickslip.core.errors import InputError, LimitCrossed
 from stickslip.identification.compare.change import compare_models
 from stickslip.identification.estimate import Identification
 from stickslip.identification.identified_file import read_identified
@@ -32,7 +32,7 @@ from stickslip.machines.encoder import Encoder
 from stickslip.machines.files import load_machine, machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier, Harmonics
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation.axes import plants_of
 from stickslip.recommendation.notes import notes_on
 from stickslip.recommendation.recommendation import Recommendation

@@ -9,13 +9,13 @@ import pytest
 
 from stickslip.commission import commission as commissioning
 from stickslip.commission.curve import moving
+from stickslip.core.record import Record
 from stickslip.identification.presliding.breakaway import identify_breakaway
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models.model import Model
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.sliding import Sliding
 from stickslip.rigs.virtual import VirtualRig

@@ -8,10 +8,10 @@ import numpy as np
 
 from stickslip import Model
 from stickslip.commission.headline import headline
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Estimate, Identification
 from stickslip.recommendation.candidates import Setting
-from stickslip.record import Record
 from stickslip.report.identified import Source, write_identification
 
 LAW = Model("gms", fs=0.3, fc=0.25, vs=0.1, sigma2=0.01, k=[200.0, 100.0], alpha=[0.5, 0.5], c=10.0)

@@ -9,11 +9,11 @@ import pytest
 
 from stickslip.commission.friction_lag import lag_of
 from stickslip.commission.stiffness import with_lag
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.files import machine
 from stickslip.machines.motor import Harmonics
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.rigs.procedures.attraction import Attraction
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.virtual import VirtualRig

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 
-from stickslip import plugins
 from stickslip.cli import main
 from stickslip.contract import motions
 from stickslip.contract.agreement import modes_against_rate, steady_is_reached, step_against_rate
@@ -16,7 +15,8 @@ from stickslip.contract.energy import gives_back
 from stickslip.contract.torques import unbounded
 from stickslip.contract.units import parsed, units
 from stickslip.contract.verdict import failed, held
-from stickslip.spec import Bristle
+from stickslip.core.spec import Bristle
+from stickslip.models import plugins
 from support.faulty import PRODUCT, dahl
 
 NO_RATE = ("rate=rate, ", "")

@@ -13,9 +13,9 @@ from stickslip.contract.control_laws import CHECKS, continuous, examine, integra
 from stickslip.contract.rest import at_rest
 from stickslip.control.linear import Compensation
 from stickslip.control.registry import control_law, control_law_names
-from stickslip.control_spec import ControlLaw
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Par, Surroundings
 from stickslip.simulation.compiled_controller import FAULT, compiled, replay
-from stickslip.spec import Par, Surroundings
 
 TURN = 2.0 * math.pi
 

@@ -12,7 +12,6 @@ import math
 import numpy as np
 import pytest
 
-from stickslip import plugins
 from stickslip.contract.energy import claims_passivity, gives_back, within_condition
 from stickslip.contract.motions import (
     STEPS,
@@ -27,8 +26,9 @@ from stickslip.contract.motions import (
     swings,
     variants,
 )
+from stickslip.core.spec import Law, Surroundings
 from stickslip.laws import LAWS
-from stickslip.spec import Law, Surroundings
+from stickslip.models import plugins
 
 CASES = 50
 """Parameter sets a law and option, each with `MOTIONS` motions."""

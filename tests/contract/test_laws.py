@@ -15,20 +15,20 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import stickslip
-from stickslip import plugins
 from stickslip.contract.agreement import step_against_rate, step_errors
 from stickslip.contract.description import bounds
 from stickslip.contract.motions import example, level_of
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Law, Mode, Surroundings
 from stickslip.jit import compiled_step, flat
 from stickslip.laws import LAWS as BUILT_IN
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models import plugins
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.spec import Law, Mode, Surroundings
 
 LAWS = [plugins.law(name) for name in plugins.law_names()]
 U = Surroundings()

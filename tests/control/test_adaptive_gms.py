@@ -12,9 +12,9 @@ import stickslip as ss
 from stickslip.control.belief import Belief
 from stickslip.control.catalogue import compensated
 from stickslip.control.registry import control_law
-from stickslip.errors import ParameterError
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Surroundings
+from stickslip.models.model import Model
 from support.golden_rows import CURVE, GMS, INERTIA, LUGRE, PID, pd
 
 TIME, LEAK, SLOPE = 1e-3, 0.05, 62.83

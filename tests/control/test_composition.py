@@ -14,9 +14,9 @@ from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.control.registry import control_law, control_law_names
-from stickslip.errors import LawError, ParameterError, UnknownName
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.core.errors import LawError, ParameterError, UnknownName
+from stickslip.core.spec import Surroundings
+from stickslip.models.model import Model
 from support import sampled_text as sampled
 from support.golden_rows import GMS, INERTIA, LUGRE, pd, pid
 
@@ -286,8 +286,8 @@ def test_a_control_law_in_a_file_of_ones_own(tmp_path):
     own = tmp_path / "spring.py"
     own.write_text(
         "from typing import Annotated, NamedTuple\n"
-        "from stickslip.control_spec import ControlLaw\n"
-        "from stickslip.spec import Par\n"
+        "from stickslip.core.control_spec import ControlLaw\n"
+        "from stickslip.core.spec import Par\n"
         "class Params(NamedTuple):\n"
         "    k: Annotated[float, Par('N·m/rad', 'k', 'stiffness', positive=True)]\n"
         "def sample(y, z, p, u):\n"

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from stickslip.core.spec import Surroundings
 from stickslip.simulation.compiled_controller import FAULT, compiled, replay
-from stickslip.spec import Surroundings
 from support.golden_rows import ROWS
 
 DATA = np.load(f"{__file__.rpartition('/control/')[0]}/data/control_golden.npz")

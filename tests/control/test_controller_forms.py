@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.config import Document, Table
 from stickslip.control.files import Placement, composed
 from stickslip.control.written import tables_of
-from stickslip.errors import ParameterError
+from stickslip.core.config import Document, Table
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Surroundings
 from stickslip.simulation.compiled_controller import COMPENSATION, compiled, replay
-from stickslip.spec import Surroundings
 
 TIME, INERTIA = 1e-3, 3.8623e-4
 PD = ss.place("PD", INERTIA, 20.0, 1.0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.spec import Surroundings
+from stickslip.core.spec import Surroundings
 from support.golden_rows import INERTIA, PID, W
 
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01}

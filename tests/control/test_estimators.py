@@ -12,7 +12,7 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.estimators import ESTIMATORS
 from stickslip.control.registry import control_law
-from stickslip.spec import Surroundings
+from stickslip.core.spec import Surroundings
 
 TIME = 1e-3
 

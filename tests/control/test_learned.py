@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError, ParameterError
-from stickslip.spec import Surroundings
+from stickslip.core.errors import InputError, ParameterError
+from stickslip.core.spec import Surroundings
 from support.golden_rows import INERTIA, ROWS
 
 DATA = np.load(f"{__file__.rpartition('/control/')[0]}/data/control_golden.npz")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import ParameterError
-from stickslip.spec import Surroundings
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Surroundings
 
 BINS, PERIOD, RATE = 16, 500, 0.8
 LOWER, UPPER = 0.0, 0.2

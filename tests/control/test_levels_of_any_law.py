@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip import plugins
 from stickslip.contract.motions import name_of, variants
 from stickslip.control.belief import believed
 from stickslip.control.catalogue import CATALOGUE, LOOPS, compensated
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Surroundings
 from stickslip.exports._sliding import Curve
-from stickslip.friction_levels import bends_of, independent, levels_of, static_level
-from stickslip.model import Model
+from stickslip.models import plugins
+from stickslip.models.friction_levels import bends_of, independent, levels_of, static_level
+from stickslip.models.model import Model
 from stickslip.recommendation.candidates import breakaway
 from stickslip.recommendation.question import laws_of
-from stickslip.spec import Surroundings
 
 INERTIA = 4e-4
 LAWS = [v for name in plugins.law_names() for v in variants(plugins.law(name))]
@@ -27,7 +27,7 @@ OWN = '''
 """A Coulomb law, smooth at rest."""
 import math
 from typing import Annotated, NamedTuple
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 
 class Params(NamedTuple):
@@ -53,7 +53,7 @@ FALL = '''
 """Stribeck's curve with a smooth sign, without the velocity over which it changes."""
 import math
 from typing import Annotated, NamedTuple
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 
 class Params(NamedTuple):

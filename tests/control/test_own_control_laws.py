@@ -8,7 +8,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.analyse.controller_loop import linearised
-from stickslip.errors import Divergence, InputError, LawError
+from stickslip.core.errors import Divergence, InputError, LawError
 from stickslip.studies.build import Numerics
 from stickslip.studies.planned_run import PlannedRun
 from stickslip.sweeps.measured import measured
@@ -17,8 +17,8 @@ HEAD = '''"""A law of one's own."""
 import math
 import numpy as np
 from typing import Annotated, NamedTuple
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Par
 
 
 class Params(NamedTuple):
@@ -114,7 +114,7 @@ def test_arguments_may_have_other_names(block):
 
 def test_a_friction_law_that_writes_its_parameters_is_refused(tmp_path):
     text = """from typing import Annotated, NamedTuple
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 
 class Params(NamedTuple):
@@ -245,7 +245,7 @@ def test_an_option_outside_the_subset_is_refused_when_it_is_chosen(block, tmp_pa
     text = (tmp_path / "own.py").read_text()
     before, after = text.split("def sample")
     options = """
-from stickslip.spec import Choice, Option
+from stickslip.core.spec import Choice, Option
 
 
 class Nothing(NamedTuple):

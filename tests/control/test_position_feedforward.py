@@ -10,7 +10,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.control.position import position_feedforward
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.files import machine
 from stickslip.machines.position_map import PositionMap, Waves
 

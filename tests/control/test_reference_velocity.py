@@ -17,10 +17,10 @@ from stickslip.control.own_loop import loop_text, split_loop
 from stickslip.control.plain import plain_sample
 from stickslip.control.recommended import Recommended, read_recommended
 from stickslip.control.written import table_as_given, tables_of
-from stickslip.errors import ConfigError, InputError, ParameterError, UnknownName
+from stickslip.core.errors import ConfigError, InputError, ParameterError, UnknownName
+from stickslip.core.spec import Surroundings
 from stickslip.exports.controllers import given_by
 from stickslip.identification.methods._experiments import loop_of as identify_loop
-from stickslip.spec import Surroundings
 from stickslip.verbs.recommend import loop_of, one_of
 
 T = 1e-3

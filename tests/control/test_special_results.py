@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.core.spec import Surroundings
 from stickslip.machines.contact import Bearings, Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
 from stickslip.recommendation.following import follow
 from stickslip.recommendation.plant import laid_out
 from stickslip.simulation.compiled_controller import compiled
-from stickslip.spec import Surroundings
 from support.golden_rows import INERTIA, ROWS
 
 SIGMA2, COUNTS, PHASES, MANY_PHASES = 0.018, 65536.0, 8, 24

@@ -10,11 +10,11 @@ import pytest
 
 import stickslip as ss
 from stickslip.control.learned import WIDTH, learned_values, read_learned, told, write_learned
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Surroundings
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
-from stickslip.spec import Surroundings
 from support.golden_rows import LUGRE, ROWS
 
 INERTIA, TIME, LEVEL = 3.8623e-4, 1e-3, 0.8

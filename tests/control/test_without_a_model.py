@@ -11,7 +11,7 @@ import stickslip as ss
 from stickslip.control.belief import Belief
 from stickslip.control.block import ControlBlock
 from stickslip.control.catalogue import compensated
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.files import machine
 from stickslip.studies.bench_metrics import judged
 

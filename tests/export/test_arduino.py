@@ -5,13 +5,13 @@ import subprocess
 
 import pytest
 
-from stickslip import plugins
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.exports import arduino, arduino_controller, c99
 from stickslip.exports.job import Job
-from stickslip.model import Model
+from stickslip.models import plugins
+from stickslip.models.model import Model
 
 
 def controller_with(model):

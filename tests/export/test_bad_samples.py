@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.core.spec import Surroundings
 from stickslip.exports import linuxcnc
 from stickslip.exports.job import Job
-from stickslip.plugins import law
-from stickslip.spec import Surroundings
+from stickslip.models.plugins import law
 from support.hal_component import Component
 from support.modelica_text import Package
 from support.structured_text import Program

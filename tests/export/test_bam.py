@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.exports import bam
 from stickslip.exports.job import CannotCarry, Job
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 positive = st.floats(1e-6, 1e6)
 XL330 = {  # M6 of the published set, bam/params/xl330/m6.json

@@ -10,19 +10,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stickslip import plugins
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Surroundings
 from stickslip.exports import c99, c99_controller
 from stickslip.exports.golden import Golden, golden, random_steps, room_beside_jumps
 from stickslip.exports.job import Job
 from stickslip.jit import call_sample, call_step, compiled_step, flat, kernel, pointer
 from stickslip.laws import LAWS as BUILT_IN
-from stickslip.model import Model
+from stickslip.models import plugins
+from stickslip.models.model import Model
 from stickslip.simulation.compiled_controller import compiled
-from stickslip.spec import Surroundings
 from support.laws import label, registered, variants
 from support.sampled_text import Memory, sampled_by, settings
 
@@ -152,7 +152,7 @@ TEETH = '''"""Torque that jumps with the way: teeth."""
 
 from typing import Annotated, NamedTuple
 
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 
 class Params(NamedTuple):

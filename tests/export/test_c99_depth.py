@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from test_c99 import COMPILERS, answers, example
 
-from stickslip import plugins
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
+from stickslip.core.spec import Surroundings
 from stickslip.exports import c99, c99_controller
 from stickslip.exports.golden import random_steps
 from stickslip.exports.job import Job
-from stickslip.spec import Surroundings
+from stickslip.models import plugins
 from support.cortex_m4f import emulated, missing
 from support.laws import farthest, label, registered
 

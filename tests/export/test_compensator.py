@@ -12,17 +12,17 @@ from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.control.recommended import read_recommended
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Surroundings
 from stickslip.exports.job import Check
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import virtual_rig
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.compiled_controller import compiled, replay
-from stickslip.spec import Surroundings
 
 MODEL = """law = "coulomb"
 [parameters]

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip import plugins
 from stickslip.contract.control_laws import Plain, specimen
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.registry import control_law, control_law_names
-from stickslip.errors import UnknownName
+from stickslip.core.errors import UnknownName
 from stickslip.exports import CONTROLLER_TARGETS, controller_target
 from stickslip.exports._fmu_run import played
 from stickslip.exports.controllers import golden_samples
 from stickslip.exports.st_controller import GIVEN
-from stickslip.model import Model
+from stickslip.models import plugins
+from stickslip.models.model import Model
 from support.structured_text import Program
 
 OWN = Path(__file__).parents[1] / "support" / "sliding_mode.py"
@@ -138,8 +138,8 @@ SIDES = """
 import math
 from typing import Annotated, NamedTuple
 
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Par
 
 
 class Params(NamedTuple):

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from test_c99 import COMPILERS, answers, built_controller, example
 
-from stickslip import plugins
 from stickslip.cli import main
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Surroundings
 from stickslip.exports import controller_target
 from stickslip.exports._step_error import step_errors
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Reference
+from stickslip.models import plugins
+from stickslip.models.model import Reference
 from stickslip.rigs.loop_sample import control_of
 from stickslip.rigs.rig import Limits
 from stickslip.simulation.closed_loop import simulate
-from stickslip.spec import Surroundings
 
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="needs a C compiler")
 T, LIMIT = 1e-3, 2.0

@@ -12,7 +12,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from stickslip import plugins
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
@@ -21,7 +20,8 @@ from stickslip.exports.fmu_axis import driven
 from stickslip.exports.job import Job
 from stickslip.jit import compiled_law
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models import plugins
+from stickslip.models.model import Model, Reference
 from stickslip.simulation import case_arrays
 from stickslip.simulation.closed_loop import simulate
 from support.laws import farthest

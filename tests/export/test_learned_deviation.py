@@ -6,8 +6,8 @@ import pytest
 from test_c99 import COMPILERS
 
 from stickslip.control.learned import WIDTH, learned_values
+from stickslip.core.spec import Learned
 from stickslip.exports.c99_controller import write
-from stickslip.spec import Learned
 from support.golden_rows import ROWS
 
 SCALE, LEAST_SQUARES, MAKKAR = (

@@ -5,11 +5,11 @@ import shutil
 import numpy as np
 import pytest
 
-from stickslip import plugins
+from stickslip.core.spec import Surroundings
 from stickslip.exports import linuxcnc
 from stickslip.exports.job import Job
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.models import plugins
+from stickslip.models.model import Model
 from support.hal_component import Component
 from support.laws import farthest, label, registered
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip import plugins
+from stickslip.core.spec import Surroundings
 from stickslip.exports import modelica
 from stickslip.exports.golden import PACE, golden_around
 from stickslip.exports.job import Job
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.models import plugins
+from stickslip.models.model import Model
 from support.laws import farthest, label, registered
 from support.modelica_text import Package
 

@@ -4,14 +4,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip import plugins
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.exports._mujoco_run import drift, pulled
 from stickslip.exports.job import CannotCarry, Job
 from stickslip.exports.mujoco import LUGRE as LUGRE_FORM
 from stickslip.exports.mujoco import holding_step, read, write, xml
 from stickslip.exports.nearest import COULOMB, carried
-from stickslip.model import Model
+from stickslip.models import plugins
+from stickslip.models.model import Model
 
 INERTIA = 3.8623e-4
 LUGRE = dict(plugins.law("lugre").example)

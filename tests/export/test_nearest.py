@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.exports import target_named
 from stickslip.exports.job import CannotCarry, Job
 from stickslip.exports.nearest import COULOMB, STATIC, STRIBECK, Curve, carried, nearest
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.verbs.export import export as export_verb
 from support.laws import farthest, label, registered
 

@@ -15,7 +15,7 @@ import tomli_w
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
 from stickslip.exports.maps import MAP_TARGETS, map_target, written
 from stickslip.exports.position_tables import c_table, moteus, odrive, vesc
 from stickslip.machines.position_map import PositionMap, Waves

@@ -7,7 +7,7 @@ import yaml
 
 from stickslip.exports import isaac, ros
 from stickslip.exports.job import Job
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 STATIC = Model("static", fs=0.335, fc=0.285, sigma2=0.018)
 COULOMB = Model("coulomb", fc=0.285, sigma2=0.018)

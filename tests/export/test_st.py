@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from lark.exceptions import UnexpectedInput
 
-from stickslip import plugins
+from stickslip.core.spec import Surroundings
 from stickslip.exports import st
 from stickslip.exports.golden import PACE, golden_around
 from stickslip.exports.job import Job
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.models import plugins
+from stickslip.models.model import Model
 from support import matiec
 from support.laws import farthest, label, registered
 from support.structured_text import Program

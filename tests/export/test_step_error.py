@@ -9,12 +9,12 @@ import subprocess
 import numpy as np
 import pytest
 
-from stickslip import plugins
+from stickslip.core.spec import Surroundings
 from stickslip.exports import _fmu, arduino, c99, fmu, fmu_axis, linuxcnc, matlab, modelica, python, st
 from stickslip.exports._step_error import PARTS, step_errors
 from stickslip.exports.job import Job
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.models import plugins
+from stickslip.models.model import Model
 from support.structured_text import Program
 
 LUGRE = Model("lugre", **plugins.law("lugre").example)

@@ -9,17 +9,27 @@ import numpy as np
 import pytest
 from test_c99 import COMPILERS, CONTROL, answers, built_controller
 
-from stickslip import plugins
 from stickslip.cli import main
 from stickslip.control import composition
 from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.exports import TARGETS, arduino, c99, c99_controller, matlab, modelica, python, st, target_named
+from stickslip.core.spec import Surroundings
+from stickslip.exports import (
+    TARGETS,
+    arduino,
+    c99,
+    c99_controller,
+    matlab,
+    modelica,
+    python,
+    st,
+    target_named,
+)
 from stickslip.exports.golden import answered
 from stickslip.exports.job import Export, Job
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.models import plugins
+from stickslip.models.model import Model
 from support.laws import farthest
 from support.structured_text import Program
 

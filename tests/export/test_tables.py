@@ -8,12 +8,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.exports import beckhoff, table
 from stickslip.exports._points import between_points
 from stickslip.exports.job import CannotCarry, Job
 from stickslip.exports.nearest import Curve
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 STRIBECK = Model("stribeck_plain", fs=0.335, fc=0.285, vs=0.01, sigma2=0.018)
 LUGRE = Model("lugre", sigma0=3.5e4, sigma1=0.1, sigma2=0.018, fs=0.335, fc=0.285, vs=0.01)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.exports._sliding import slowest_scale, velocity_scale
 
 LAW = ss.Model("coulomb", fc=0.3, sigma2=0.02)
 OWN = '''"""Friction with an excess at low velocity."""
 import math
 from typing import Annotated, NamedTuple
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 
 class Params(NamedTuple):
@@ -96,8 +96,8 @@ def test_no_comment_is_empty(to, own):
 def test_a_controllers_law_without_source_ends_without_a_semicolon(tmp_path):
     """The README had "loop: PD; "."""
     text = """from typing import Annotated, NamedTuple
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Par
 
 
 class Params(NamedTuple):

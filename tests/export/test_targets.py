@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from stickslip import plugins
 from stickslip.exports import TARGETS, target_named
 from stickslip.exports.job import CannotCarry, Job
-from stickslip.model import Model
+from stickslip.models import plugins
+from stickslip.models.model import Model
 from support.laws import farthest, label, registered
 
 ALL = {name: target_named(name) for name in TARGETS}

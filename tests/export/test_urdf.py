@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.exports import urdf
 from stickslip.exports.job import Job
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 number = st.floats(0.0, 1e6, allow_subnormal=False)
 

@@ -13,9 +13,9 @@ from stickslip.identification.alternatives import usual_alternatives
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.alternatives.cogging import order_of
 from stickslip.identification.alternatives.load import registry_for
+from stickslip.identification.experiment import Experiment
 from stickslip.identification.rows import SlidingRows, sliding_rows
 from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
-from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from support import analytic_records as analytic
 

@@ -12,10 +12,10 @@ import pytest
 
 from stickslip.cli import main
 from stickslip.identification import memo
+from stickslip.identification.experiment import Experiment
 from stickslip.identification.memo import SlidingMemo
 from stickslip.identification.search import Asked
 from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
-from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from support.analytic_records import TRUTH
 from support.analytic_records import record as analytic_record

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from stickslip.identification.experiment import Experiment
 from stickslip.identification.search import Asked
 from stickslip.identification.sliding import Number, SlidingPosterior, estimate_sliding
-from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 
 AXIS = ServoAxis(drive_side="load")

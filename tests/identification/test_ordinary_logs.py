@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.axis import identify_axis
+from stickslip.identification.experiment import Experiment
 from stickslip.identification.search import Asked
 from stickslip.identification.sliding import estimate_sliding
-from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 
 AXIS = ServoAxis(drive_side="load")

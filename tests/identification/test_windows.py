@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.identification.experiment import Experiment
 from stickslip.identification.sliding import estimate_sliding
 from stickslip.identification.windows import apply_at, unblurred_weights, window_weights
-from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 from support.analytic_records import TRUTH, record
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.steady_friction.position_dependence import identify_angle
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.files import machine
 from stickslip.machines.motor import Harmonics
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.sliding import Sliding
 from stickslip.rigs.virtual import VirtualRig

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from stickslip import law_names
-from stickslip.errors import InputError, ParameterError, UnknownName
+from stickslip.core.errors import InputError, ParameterError, UnknownName
 from stickslip.identification.axis import identify_axis
-from stickslip.identification.output_error.output import Extras, output_error
 from stickslip.identification.estimate import Identification
 from stickslip.identification.experiment import Experiment, experiment_of
 from stickslip.identification.fit.axis_start import dimensions, starts
+from stickslip.identification.output_error.output import Extras, output_error
 from stickslip.identification.regression.inverse import correlation_lags, inverse_dynamics
 from stickslip.machines.servo import Motor, ServoAxis
-from stickslip.plugins import law
+from stickslip.models.plugins import law
 from stickslip.simulation.recorded_input.simulation import Drive, Harmonics, Loop, Mechanics, drive_axis
 from support import axis_cases as cases
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.core.record import Record
 from stickslip.identification.doctor import examine
 from stickslip.identification.doctor.play import backlash, dead_travel
 from stickslip.identification.doctor.view import View
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models.model import Model
 from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, drive_axis
 from support.places import DATA, ROOT, needs_data
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from stickslip import Model, Record
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.presliding.breakaway import find_breaks, identify_breakaway, mean_estimate
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 

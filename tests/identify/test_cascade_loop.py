@@ -11,11 +11,11 @@ import pytest
 
 import stickslip as ss
 from stickslip.control.linear import Cascade
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.axis import identify_axis
-from stickslip.identification.output_error.loop_check import doubted_loops, shown_gains
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.methods._experiments import loop_of
+from stickslip.identification.output_error.loop_check import doubted_loops, shown_gains
 from stickslip.machines.servo import ServoAxis
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, control_signal, drive_axis
 from stickslip.verbs.identify import loops_of

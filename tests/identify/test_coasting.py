@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 INERTIA, FC, SIGMA2 = 2e-3, 0.05, 4e-4
 

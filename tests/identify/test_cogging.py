@@ -10,7 +10,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.record import Record
 from stickslip.exports.maps import map_target, written
 from stickslip.identification.cogging import identify_cogging
 from stickslip.identification.cogging.moving import speed_control
@@ -18,7 +19,6 @@ from stickslip.identification.methods import method_named
 from stickslip.identification.methods.method import Options
 from stickslip.machines.files import machine
 from stickslip.machines.position_map import PositionMap, Waves
-from stickslip.record import Record
 from stickslip.report.after_a_map import after_a_map
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.cogging import Cogging

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from stickslip.core.record import Record
 from stickslip.identification.cogging import identify_cogging
 from stickslip.identification.cogging.noise import Noise, density_of, excess, widened
 from stickslip.identification.cogging.rows import Places
-from stickslip.record import Record
 
 TURN = 2.0 * np.pi
 UNITS = {"position": "rad", "motor_torque": "N·m"}

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import optimize, stats
 
 from stickslip import Model, Par, law, law_names
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
 from stickslip.identification.estimate import Identification
 from stickslip.identification.fit.broyden import descend_by_secants
 from stickslip.identification.fit.levenberg_marquardt import Squares, central_differences, descend

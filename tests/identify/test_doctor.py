@@ -12,7 +12,7 @@ import pytest
 import stickslip
 from stickslip import Controller, Model, Record, Reference, RigidAxis, place, simulate
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.doctor import ERRORS, examine
 from stickslip.readers import Drive, read
 from stickslip.readers.cut import Cut, cut

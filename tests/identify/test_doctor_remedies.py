@@ -9,7 +9,7 @@ import pytest
 
 import stickslip as ss
 from stickslip import Record
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.doctor import examine
 
 J, FC, COUNTS, RATED = 1e-3, 0.3, 8192, 1.3

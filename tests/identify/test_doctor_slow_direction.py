@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record, encoder_step
 from stickslip.identification.doctor import examine
-from stickslip.record import Record, encoder_step
 
 PERIOD = 0.002
 CREEP_AND_RUN = ((0.0, 0.5), (0.65, 10.0), (0.0, 0.5), (-25.0, 2.6), (0.0, 0.5))

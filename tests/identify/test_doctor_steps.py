@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
+from stickslip.core.record import Record
 from stickslip.identification.doctor import examine
-from stickslip.record import Record
 
 INERTIA, LEVEL = 2e-2, 0.1
 UNITS = {"position": "rad", "velocity": "rad/s", "motor_torque": "N·m"}

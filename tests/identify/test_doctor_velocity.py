@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import butter, lfilter
 
+from stickslip.core.record import Record
 from stickslip.identification.doctor.velocity import velocity_late, velocity_scale
 from stickslip.identification.doctor.view import View
-from stickslip.record import Record
 
 RATE = 1000.0
 T = np.arange(8000) / RATE

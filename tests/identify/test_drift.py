@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.compare.change import compare_models
 from stickslip.identification.compare.motor_or_load import on_one_side
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.identified_file import Identified
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 UNITS = {"fs": "N·m", "fc": "N·m", "vs": "rad/s", "sigma2": "N·m·s/rad", "k": "N·m·s/rad", "inertia": "kg·m²"}
 TRUE = {"k": 50.0, "fs": 0.335, "fc": 0.285, "vs": 0.1, "sigma2": 0.018, "inertia": 4e-4}

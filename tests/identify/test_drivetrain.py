@@ -10,7 +10,7 @@ import pytest
 from stickslip.analyse.tracking import tracking_metrics
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.response.drivetrain import fit_drivetrain, identified_drivetrain, loop_response
 from stickslip.identification.response.nyquist import fastest_pd
 from stickslip.machines.contact import Contact
@@ -18,7 +18,7 @@ from stickslip.machines.encoder import Encoder
 from stickslip.machines.files import machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.two_mass import TwoMassAxis
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.resonance import Resonance

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.axis import identify_axis
-from stickslip.identification.output_error.plain import inverse_identification
 from stickslip.identification.estimate import Identification
 from stickslip.identification.evidence import extrapolated
 from stickslip.identification.experiment import Experiment
@@ -19,9 +18,10 @@ from stickslip.identification.fit.parameter_vector import Vector
 from stickslip.identification.identified_file import read_identified
 from stickslip.identification.model_file import write_model
 from stickslip.identification.monte_carlo import draw_models
+from stickslip.identification.output_error.plain import inverse_identification
 from stickslip.identification.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
-from stickslip.model import Model
+from stickslip.models.model import Model
 from support import axis_cases as cases
 
 FORTH, BACK = 0.3, 0.24

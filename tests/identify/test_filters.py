@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import linalg, signal
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.fit.filters import (
     RIPPLE,
     ZeroPhase,

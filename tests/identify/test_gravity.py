@@ -10,10 +10,10 @@ import pytest
 import stickslip as ss
 from stickslip import Model
 from stickslip.identification.axis import identify_axis
-from stickslip.identification.sliding import estimate_sliding
-from stickslip.identification.output_error.gravity import hanging, nearest, within_a_turn
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.experiment import Experiment
+from stickslip.identification.output_error.gravity import hanging, nearest, within_a_turn
+from stickslip.identification.sliding import estimate_sliding
 from stickslip.machines.contact import Contact
 from stickslip.machines.motor import Harmonics
 from stickslip.machines.servo import ServoAxis

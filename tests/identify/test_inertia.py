@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip import Model
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.estimate import Estimate, Identification
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.response.inertia import frequency_response, inertia, verdict_on

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, plugins, simulate
+from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.presliding.known_curve import describe_unused, static_levels, transfer_curve
+from stickslip.models import plugins
 from stickslip.simulation.prescribed.motion import Along
 
 INERTIA = 4.2757e-4

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 
 def staircase(seed: int = 0) -> dict[str, np.ndarray]:

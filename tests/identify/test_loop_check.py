@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from stickslip.identification.axis import identify_axis
-from stickslip.identification.output_error.loop_check import GAINS, doubted_loops, shown_gains
 from stickslip.identification.experiment import Experiment
+from stickslip.identification.output_error.loop_check import GAINS, doubted_loops, shown_gains
 from stickslip.machines.servo import ServoAxis
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 from support import axis_cases as cases

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip import Controller, Gains, Model, Reference, RigidAxis, simulate
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.estimate import Identification
 from stickslip.identification.presliding.lugre_dynamics import Response, fit_position, identify_lugre_dynamics
 

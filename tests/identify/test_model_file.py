@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip import plugins
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.estimate import Estimate, Identification
 from stickslip.identification.model_file import write_model
-from stickslip.model import Model
+from stickslip.models import plugins
+from stickslip.models.model import Model
 
 LAWS = [plugins.law(name) for name in plugins.law_names()]
 LAWS += [law.having(**{c.name: list(c.options)[-1] for c in law.choices}) for law in LAWS if law.choices]

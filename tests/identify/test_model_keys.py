@@ -7,7 +7,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 LAW = 'law = "coulomb"\n'
 NUMBERS = "[parameters]\nfc = 0.51\nsigma2 = 0.08\n"

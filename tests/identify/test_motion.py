@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.identification.motion import HOLD, LONGEST, Motion, motion_in, motion_of, sinusoid, speeds_of
-from stickslip.record import Record
 
 T = 1e-3
 

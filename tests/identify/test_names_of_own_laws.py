@@ -15,7 +15,7 @@ CAUCHY = '''"""Friction that falls as 1 / (1 + (v / vs)^2)."""
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 
 class Params(NamedTuple):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from stickslip.control.linear import place
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.response.drivetrain import LoopResponse
 from stickslip.identification.response.nyquist import encirclements, fastest_pd
 

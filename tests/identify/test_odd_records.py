@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.fit.multistart import separable_starts
 from stickslip.identification.fit.parameter_vector import Vector
 

@@ -13,8 +13,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError
-from stickslip.record import Record
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 
 ROOT = Path(__file__).parents[2]
 UNITS = {"position": "rad", "motor_torque": "N·m"}

@@ -8,7 +8,7 @@ import pytest
 
 from stickslip import Model, Reference, respond
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.presliding.attraction import (
     OVERSHOOT,
     apply_overshoot_rule,

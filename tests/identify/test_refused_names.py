@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
 from stickslip.identification.methods import METHODS, method_named
 from stickslip.identification.methods._records import known_curve
 from stickslip.identification.methods.method import Options
 from stickslip.identification.methods.sliding import refuse_unknown
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 OWN = ("axis", "cogging", "sliding", "presliding", "lugre")
 """Those that look at parameters of a law, or at names of their own, themselves."""

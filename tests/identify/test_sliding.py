@@ -10,7 +10,7 @@ import pytest
 
 from stickslip import Controller, Gains, Model, Record, Reference, RigidAxis, simulate
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.estimate import Identification
 from stickslip.identification.steady_friction.choice import candidates, choose_sliding
 from stickslip.identification.steady_friction.curve import identify_sliding

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.model_file import model_data
 from stickslip.identification.steady_friction.curve import identify_sliding
 from stickslip.identification.steady_friction.points import SlidingPoints

@@ -12,7 +12,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.fit.multistart import separable_starts
 from stickslip.identification.fit.parameter_vector import Vector
 

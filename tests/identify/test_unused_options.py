@@ -10,7 +10,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.methods import METHODS, method_named
 
 GIVEN: dict[str, tuple[dict[str, Any], list[str]]] = {

@@ -7,10 +7,10 @@ import pytest
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
+from stickslip.core.spec import Surroundings
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.spec import Surroundings
 
 U = Surroundings()
 MODEL = Model("armstrong", kt=2.5e4, fc=0.285, fs_inf=0.05, vs=0.01, tau=1e-3, gamma=0.1)

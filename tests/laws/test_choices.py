@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PchipInterpolator
 
-from stickslip import plugins
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Surroundings
 from stickslip.laws.sliding_curve import stribeck
-from stickslip.model import Model, Reference
+from stickslip.models import plugins
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.prescribed.open_loop import respond
-from stickslip.spec import Surroundings
 from stickslip.subset import law_layouts, lower
 
 LAWS = [plugins.law(name) for name in plugins.law_names()]

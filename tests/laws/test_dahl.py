@@ -9,11 +9,11 @@ import pytest
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
+from stickslip.core.spec import Surroundings
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.prescribed.open_loop import respond
-from stickslip.spec import Surroundings
 
 U = Surroundings()
 SIGMA0, FC = 3.5e4, 0.285

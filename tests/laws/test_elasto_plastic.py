@@ -10,11 +10,11 @@ from scipy.integrate import solve_ivp
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Surroundings
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
-from stickslip.spec import Surroundings
 
 U = Surroundings()
 CONTACT = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import stickslip as ss
+from stickslip.core.spec import Surroundings
 from stickslip.laws.gms import LAW
-from stickslip.spec import Surroundings
 
 K, C, TIME = [12896.0, 8141.0, 4273.0], 23.8782, 1e-3
 VALUES = {"k": K, "alpha": [1 / 3] * 3, "c": C, "fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}

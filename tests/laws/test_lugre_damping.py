@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.spec import Surroundings
+from stickslip.core.spec import Surroundings
 
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}
 STIFF = 3.5e4

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.spec import Surroundings
+from stickslip.core.spec import Surroundings
 
 VALUES = {"sigma0": 3.5e4, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}
 FORMS = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 
 EXAMPLE = dict(ss.law("makkar").example)
 MODEL = ss.Model("makkar", **EXAMPLE)

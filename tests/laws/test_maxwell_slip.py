@@ -8,11 +8,11 @@ import pytest
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
+from stickslip.core.spec import Surroundings
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.prescribed.open_loop import respond
-from stickslip.spec import Surroundings
 
 U = Surroundings()
 MODEL = Model("maxwell_slip", k=[1e4, 7e3, 5e3, 3e3], w=[0.08375] * 4)

@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from stickslip import plugins
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.errors import InputError, ParameterError
+from stickslip.core.spec import Surroundings
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models import plugins
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.prescribed.open_loop import respond
-from stickslip.spec import Surroundings
 
 LAWS = [plugins.law(name) for name in ("coulomb", "stribeck_plain", "lugre", "gms")]
 some_laws = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip import plugins
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.errors import InputError, ParameterError
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models import plugins
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.prescribed.open_loop import respond
 

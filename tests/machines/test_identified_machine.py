@@ -10,7 +10,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError, StickslipError
+from stickslip.core.errors import InputError, StickslipError
 from stickslip.machines.files import machine
 
 HEAD = 'format = "stickslip-model-1"\nlaw = "coulomb"\n'

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.drivetrain import INPUTS, Chain, Drivetrain, LinearContact
 from stickslip.machines.files import machine
 from stickslip.simulation.machine import plant

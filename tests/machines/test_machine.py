@@ -11,7 +11,7 @@ import pytest
 import stickslip as ss
 from stickslip.analyse.flexibility import lowest_first_mode
 from stickslip.cli import main
-from stickslip.errors import ConfigError, ModelRemark, ParameterError, UnknownName
+from stickslip.core.errors import ConfigError, ModelRemark, ParameterError, UnknownName
 from stickslip.machines.files import library, machine
 from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.machine import IMPERFECTIONS

@@ -11,7 +11,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import ConfigError, InputError
+from stickslip.core.errors import ConfigError, InputError
 from stickslip.machines.files import library
 from stickslip.machines.keys import PARTS
 from stickslip.machines.written import machine_text, template

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.errors import InputError, ParameterError
 from stickslip.machines.files import library, machine
 from stickslip.machines.numbers import machine_numbers, with_numbers
 

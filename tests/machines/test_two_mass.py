@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import stickslip as ss
-from stickslip.errors import ConfigError, ParameterError
+from stickslip.core.errors import ConfigError, ParameterError
 from stickslip.machines.numbers import machine_numbers, with_numbers
 from stickslip.simulation.machine.layout import lay_out_machine, run
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.identification.doctor import examine
 from stickslip.readers import read
-from stickslip.record import Record
 
 N = 400
 TIME = np.arange(N) * 1e-3

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.readers import open_table, read
-from stickslip.record import Record
 
 FAST, SLOW = np.arange(400.0), 4.0 * np.arange(100)
 """Times of two rates, ms."""

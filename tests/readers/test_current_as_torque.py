@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.readers import Drive, read
 
 

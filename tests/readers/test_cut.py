@@ -13,7 +13,7 @@ import pytest
 
 from stickslip import Record
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.doctor import examine
 from stickslip.readers.cut import Cut, cut, file_rows, parse_rows, pieces, unwrapped
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.readers import _guard, _mat_check, open_table
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from stickslip import Record
-from stickslip.errors import InputError
-from stickslip.messages import render
+from stickslip.core.errors import InputError
+from stickslip.core.messages import render
 from stickslip.readers import Drive, read
 from stickslip.readers.derive import METHODS, with_position, with_resampled_time, with_velocity
 

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.readers import read
 
 T = 0.5 + np.arange(200) * 1e-3

@@ -17,7 +17,7 @@ import pytest
 import scipy.io
 
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.readers import limits, open_table
 
 MANY = 200_000_000

@@ -13,10 +13,10 @@ import pyarrow.parquet
 import pytest
 import scipy.io
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.readers import open_table, read
 from stickslip.readers.reading import formats
-from stickslip.record import Record
 
 N = 300
 T = np.arange(N) * 1e-3

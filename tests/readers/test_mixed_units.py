@@ -10,8 +10,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError
-from stickslip.messages import render
+from stickslip.core.errors import InputError
+from stickslip.core.messages import render
 from stickslip.readers import Drive, read
 from stickslip.readers.profiles import Profile, merged
 

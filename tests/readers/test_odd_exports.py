@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.readers import read
 from stickslip.readers._cells import cell
-from stickslip.record import Record
 
 N = 200
 T = np.arange(N) * 2e-3

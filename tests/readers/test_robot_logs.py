@@ -15,7 +15,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.readers import Drive, open_table, read
 
 N = 600

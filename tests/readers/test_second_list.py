@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.readers import Drive, read
 
 T = np.arange(500) * 0.004

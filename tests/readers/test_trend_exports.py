@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.readers import read
 from stickslip.readers._cells import cell
 from stickslip.readers._stated_period import stated_period

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from stickslip.identification.experiment import Experiment
 from stickslip.identification.output_error.loop_check import doubted_loops
 from stickslip.identification.output_error.output import output_error
-from stickslip.identification.experiment import Experiment
 from stickslip.identification.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
-from stickslip.plugins import law
+from stickslip.models.plugins import law
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 from support.places import DATA, needs_data
 

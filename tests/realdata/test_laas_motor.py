@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError
-from stickslip.identification.sliding import estimate_sliding
-from stickslip.identification.output_error.over_angle import over_angle
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.identification.cogging import identify_cogging
 from stickslip.identification.cogging.moving import in_motion
 from stickslip.identification.experiment import Experiment
+from stickslip.identification.output_error.over_angle import over_angle
+from stickslip.identification.sliding import estimate_sliding
 from stickslip.machines.servo import ServoAxis
-from stickslip.record import Record
 from support import places
 from support.places import needs_data
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from test_recommend_reasons import drive_of
 
+from stickslip.core.messages import render
 from stickslip.identification.motion import HOLD, Motion
 from stickslip.machines.rigid import RigidAxis
-from stickslip.messages import render
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation.candidate_run import Drive, Trial, run
 from stickslip.recommendation.candidates import Bench, Candidate, Setting
 from stickslip.recommendation.course import course_of

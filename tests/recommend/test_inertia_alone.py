@@ -14,7 +14,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.recommended import read_recommended
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.identified_file import Identified
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation import recommend as recommending
 from stickslip.recommendation.candidate_run import Drive
 from stickslip.recommendation.candidates import Candidate, Setting

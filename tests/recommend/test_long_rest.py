@@ -14,7 +14,7 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import pid
 from stickslip.identification.identified_file import Identified
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.recommendation import long_rest
 from stickslip.recommendation import recommend as recommending
 from stickslip.recommendation.long_rest import HUNTS, hunts_with, integrates, unsure_at_rest

@@ -10,7 +10,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.motion import Motion
 from stickslip.readers import profiles
 from stickslip.readers.convert import Drive

@@ -8,14 +8,14 @@ from types import SimpleNamespace
 import pytest
 from test_recommend_beside import THESIS, known
 
-from stickslip.approval import allow_code
 from stickslip.control.block import ControlBlock
 from stickslip.control.catalogue import compensated
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.linear import Gains
 from stickslip.control.written import tables_of
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.code_approval import allow_code
+from stickslip.core.errors import InputError, UnknownName
 from stickslip.recommendation import recommend as recommending
 from stickslip.recommendation.beside import Beside, Own, belief_of, fed
 from stickslip.recommendation.file import write_setting
@@ -28,8 +28,8 @@ FOUND = known(**THESIS)
 
 LAW = """
 from typing import Annotated, NamedTuple
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Par
 
 class Params(NamedTuple):
     stiffness: Annotated[float, Par("N·m/rad", "k", "of the loop", positive=True)]

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from stickslip.control.linear import Cascade
+from stickslip.core.record import Record
 from stickslip.identification.motion import motion_of
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation.candidate_run import Drive
 from stickslip.recommendation.candidates import AFTER_A_PUSH, Bench, Candidate, Setting
 from stickslip.recommendation.plant import Plant
 from stickslip.recommendation.pushed import PUSHED, pushes
-from stickslip.record import Record
 
 INERTIA = 2.378e-3
 LAW = Model("lugre", sigma0=1489.0, sigma1=1.385, fs=0.668, fc=0.4614, vs=0.0701, delta_s=2.0, sigma2=0.00644)

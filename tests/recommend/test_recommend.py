@@ -13,12 +13,13 @@ import pytest
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.errors import InputError, ParameterError
+from stickslip.core.spec import Surroundings
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.identified_file import Identified
 from stickslip.identification.motion import sinusoid
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.recommendation import recommend as recommending
 from stickslip.recommendation.axes import plants_of
 from stickslip.recommendation.candidate_run import Plant, dangers, run
@@ -27,7 +28,6 @@ from stickslip.recommendation.recommend import Drive, Setting, recommend
 from stickslip.recommendation.refusals import refuse_weak
 from stickslip.report.recommendation_text import recommendation_lines
 from stickslip.simulation.closed_loop import simulate
-from stickslip.spec import Surroundings
 from support.sampled_text import Memory, sampled_by, settings
 
 INERTIA = 4e-4

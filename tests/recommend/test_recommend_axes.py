@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from stickslip.control.linear import Cascade, Gains, place
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.identified_file import Identified
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation import recommend as recommending
 from stickslip.recommendation.axes import MOST_STATIC, plants_of
 from stickslip.recommendation.candidate_run import Plant, run

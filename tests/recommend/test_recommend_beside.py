@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from test_recommend_axes import estimate
 
-from stickslip import plugins
 from stickslip.control.belief import believed
 from stickslip.control.catalogue import CATALOGUE, compensated
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.linear import Gains
-from stickslip.errors import InputError, ParameterError, UnknownName
+from stickslip.core.errors import InputError, ParameterError, UnknownName
 from stickslip.identification.identified_file import Identified
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models import plugins
+from stickslip.models.model import Model, Reference
 from stickslip.recommendation import beside, long_rest
 from stickslip.recommendation import recommend as recommending
 from stickslip.recommendation.beside import belief_of, tried_beside

@@ -12,7 +12,6 @@ import tomli_w
 from test_recommend_axes import INERTIA, PD, identified
 
 import stickslip as ss
-from stickslip.approval import allow_code
 from stickslip.cli import main
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
@@ -20,8 +19,9 @@ from stickslip.control.files import read_controller
 from stickslip.control.linear import Cascade
 from stickslip.control.recommended import read_recommended
 from stickslip.control.written import tables_of
-from stickslip.errors import ParameterError
-from stickslip.model import Model
+from stickslip.core.code_approval import allow_code
+from stickslip.core.errors import ParameterError
+from stickslip.models.model import Model
 from stickslip.recommendation import recommend as recommending
 from stickslip.recommendation.candidates import Setting
 from stickslip.recommendation.recommend import Drive, recommend

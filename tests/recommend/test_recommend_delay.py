@@ -13,7 +13,7 @@ from test_recommend_composed import MODEL
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.recommendation.axes import plants_of
 from stickslip.recommendation.following import simulated
 from stickslip.recommendation.plant import Plant

@@ -16,13 +16,13 @@ import stickslip as ss
 from stickslip.cli import main
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.contact import Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.files import machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation import recommend as recommending
 from stickslip.recommendation.axes import plants_of
 from stickslip.recommendation.candidate_run import rings, run

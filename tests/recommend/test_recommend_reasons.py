@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from stickslip.control.linear import Cascade, Gains
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import render
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.identified_file import Identified
 from stickslip.identification.motion import sinusoid
 from stickslip.machines.rigid import RigidAxis
-from stickslip.messages import render
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation.candidate_run import Drive, run
 from stickslip.recommendation.candidates import Bench, rings_alone
 from stickslip.recommendation.notes import lag_of, sampled_as

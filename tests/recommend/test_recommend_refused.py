@@ -11,11 +11,11 @@ import pytest
 from test_inertia_alone import identified
 
 from stickslip.control.linear import Cascade
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import render
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.identified_file import Identified
-from stickslip.messages import render
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation import recommend as recommending
 from stickslip.recommendation.axes import plants_of
 from stickslip.recommendation.candidate_run import Drive

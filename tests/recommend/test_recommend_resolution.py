@@ -12,16 +12,16 @@ from test_inertia_alone import identified
 
 import stickslip as ss
 from stickslip.control.recommended import read_recommended
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
+from stickslip.core.messages import render
+from stickslip.core.record import Record
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine
-from stickslip.messages import render
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation import recommend as recommending
 from stickslip.recommendation.recommend import Drive
 from stickslip.recommendation.resolution import encoder_for
-from stickslip.record import Record
 from stickslip.verbs import recommend as verb
 from stickslip.verbs.identify import about
 

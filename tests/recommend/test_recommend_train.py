@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.identified_file import Identified, read_identified
 from stickslip.recommendation.axes import plants_of
 from support.belt import LOAD, MOTOR, coulomb, driven, followed

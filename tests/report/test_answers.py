@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from stickslip import Model
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
+from stickslip.core.messages import Surface, render, shown_on
+from stickslip.core.record import Record
 from stickslip.identification.axis import identify_axis
 from stickslip.identification.estimate import Estimate, Held, Identification
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.needed_motions import EXPERIMENTS, MOTIONS
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import Surface, render, shown_on
-from stickslip.record import Record
 from stickslip.report.answers import answers_of, either_way, evidence, meaning_of, one_number_each
 from stickslip.report.axis_pictures import pictures_of
 from stickslip.report.identified import Source, rendered, symbol, tally

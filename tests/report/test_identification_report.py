@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Estimate, Identification
-from stickslip.record import Record
 from stickslip.report.identified import Source, write_identification
 from stickslip.report.plots import quantity, tied
 

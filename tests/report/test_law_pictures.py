@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip import plugins
 from stickslip.cli import main
-from stickslip.model import Model, Reference
+from stickslip.models import plugins
+from stickslip.models.model import Model, Reference
 from stickslip.report.law_pictures import (
     draw_gallery,
     draw_law,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from stickslip import report
-from stickslip.approval import allow_code
+from stickslip.core.code_approval import allow_code
 from stickslip.report._tables import MetricsTable, metrics_tables
 from stickslip.report._view import StudyView
 from stickslip.report.bench_report import shown
@@ -224,8 +224,8 @@ def test_a_law_keeps_its_colour_and_others_differ() -> None:
 
 OWN_LOOP = '''
 from typing import Annotated, NamedTuple
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Par
 
 class Params(NamedTuple):
     slope: Annotated[float, Par("N·m/rad", "k", "slope", positive=True)]
@@ -280,7 +280,7 @@ def test_importing_the_report_loads_no_matplotlib() -> None:
 
 
 def test_an_unwritable_folder_is_one_line(result: StudyResult, tmp_path: Path) -> None:
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
 
     (tmp_path / "figures").write_text("in the way")
     with pytest.raises(InputError, match="; choose another place"):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from test_loop import sine
 
-from stickslip.errors import InputError, Overrun
+from stickslip.core.errors import InputError, Overrun
 from stickslip.rigs.loop import Loop
 from support.axis_rig import LIMITS, AxisRig
 

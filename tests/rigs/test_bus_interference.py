@@ -10,8 +10,8 @@ can = pytest.importorskip("can")
 
 from test_ds402 import NODE, drive  # noqa: E402, F401
 
-from stickslip.errors import DriveFault, InputError, RigError  # noqa: E402
-from stickslip.record import Record  # noqa: E402
+from stickslip.core.errors import DriveFault, InputError, RigError  # noqa: E402
+from stickslip.core.record import Record  # noqa: E402
 from stickslip.rigs import cia402  # noqa: E402
 from stickslip.rigs.ds402 import Ds402  # noqa: E402
 from stickslip.rigs.loop import Loop  # noqa: E402

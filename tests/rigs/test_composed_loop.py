@@ -11,7 +11,7 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.rig import setpoints

@@ -27,9 +27,9 @@ from stickslip.cli import main  # noqa: E402
 from stickslip.control.compensator import Feedforward  # noqa: E402
 from stickslip.control.controller import Controller  # noqa: E402
 from stickslip.control.linear import pd  # noqa: E402
-from stickslip.errors import DriveFault, InputError, MessageLost, RigError  # noqa: E402
-from stickslip.model import Model  # noqa: E402
-from stickslip.record import Record  # noqa: E402
+from stickslip.core.errors import DriveFault, InputError, MessageLost, RigError  # noqa: E402
+from stickslip.core.record import Record  # noqa: E402
+from stickslip.models.model import Model  # noqa: E402
 from stickslip.rigs.ds402 import Ds402, Settings  # noqa: E402
 from stickslip.rigs.files import read_rig  # noqa: E402
 from stickslip.rigs.loop import Loop  # noqa: E402

@@ -31,13 +31,13 @@ from test_loop import sine
 from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd
-from stickslip.errors import DriveFault, Interrupted, LimitCrossed, MessageLost, RecordFault, RigError
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.core.errors import DriveFault, Interrupted, LimitCrossed, MessageLost, RecordFault, RigError
+from stickslip.core.record import Record
+from stickslip.core.stream import EXTENT
+from stickslip.models.model import Model
 from stickslip.rigs.ds402 import Ds402
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Measurement, setpoints
-from stickslip.stream import EXTENT
 from support.axis_rig import LIMITS, AxisRig
 
 SAMPLES = round(LIMITS.stop_time / 1e-3)

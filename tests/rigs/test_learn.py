@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import tomli_w
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.machines.files import machine
 from stickslip.machines.motor import Harmonics
 from stickslip.machines.position_map import PositionMap, Waves

@@ -13,9 +13,9 @@ import pytest
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
-from stickslip.errors import InputError, Interrupted, LimitCrossed, RigError
+from stickslip.core.errors import InputError, Interrupted, LimitCrossed, RigError
+from stickslip.core.record import Record
 from stickslip.readers import read
-from stickslip.record import Record
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.narrower_limits import limited

@@ -12,8 +12,8 @@ from test_loop import sine
 from stickslip import cli
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd
-from stickslip.errors import InputError, RigError
-from stickslip.record import Record
+from stickslip.core.errors import InputError, RigError
+from stickslip.core.record import Record
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.procedures.presliding import Presliding
@@ -162,7 +162,7 @@ def test_a_size_beyond_memory_or_patience_is_told_before(name, option, said, tmp
 
 
 def test_memory_is_told_with_its_numbers(monkeypatch):
-    monkeypatch.setattr("stickslip.capacity.free_memory", lambda: 2e7)
+    monkeypatch.setattr("stickslip.core.resources.free_memory", lambda: 2e7)
     with pytest.raises(InputError, match=r"1.51e\+05 samples at once need .* of memory, 20 MB are free"):
         perform(Presliding(frequency=0.02), AxisRig())
     # One velocity after the other is in memory: a long run of many fits.

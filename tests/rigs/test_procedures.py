@@ -12,18 +12,18 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.record import Record
+from stickslip.core.spec import Surroundings
 from stickslip.identification.experiment import experiment_of
 from stickslip.identification.presliding.breakaway import find_breaks
 from stickslip.identification.response.inertia import inertia
 from stickslip.identification.steady_friction.segments import sliding_points
 from stickslip.machines.files import machine
 from stickslip.machines.servo import ServoAxis
-from stickslip.record import Record
 from stickslip.rigs.procedures import PROCEDURES, procedure
 from stickslip.rigs.procedures.base import CheckFailed, perform
 from stickslip.rigs.virtual import VirtualRig, virtual_rig
-from stickslip.spec import Surroundings
 from support.sampled_text import Memory, sampled_by, settings
 
 SHORT = {

@@ -13,11 +13,11 @@ from test_loop import sine
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd
-from stickslip.errors import RecordFault
-from stickslip.record import Record
+from stickslip.core.errors import RecordFault
+from stickslip.core.record import Record
+from stickslip.core.stream import EXTENT, KEPT, PERIOD, Stream
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Measurement
-from stickslip.stream import EXTENT, KEPT, PERIOD, Stream
 from support.axis_rig import LIMITS, AxisRig
 
 PD = Controller(pd(19.7612, 0.1747), torque_limit=0.95)
@@ -141,7 +141,7 @@ def test_a_disk_that_does_not_answer_stops_a_loop_that_keeps_pace(tmp_path):
 
 def test_old_rows_are_read_back_from_the_file(tmp_path, monkeypatch):
     """Memory holds the newest alone, so that it does not grow with the run."""
-    monkeypatch.setattr("stickslip.stream.KEPT", 2)
+    monkeypatch.setattr("stickslip.core.stream.KEPT", 2)
     assert KEPT > 2
     stream = Stream({"time": "s", "position": "rad"}, tmp_path / "a.stream")
     for extent in range(6):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from test_loop import PD, sine
 
-from stickslip.errors import ConfigError, InputError, LimitCrossed, RigError
-from stickslip.record import Record
+from stickslip.core.errors import ConfigError, InputError, LimitCrossed, RigError
+from stickslip.core.record import Record
 from stickslip.rigs.files import read_rig
 from stickslip.rigs.kinds import rig_kind, rig_kind_names
 from stickslip.rigs.loop import Loop

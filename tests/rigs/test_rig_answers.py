@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip._stream_file import rows_since
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
-from stickslip.errors import InputError, LimitCrossed, MeasurementFault, RigError
-from stickslip.record import Record
+from stickslip.core._stream_file import rows_since
+from stickslip.core.errors import InputError, LimitCrossed, MeasurementFault, RigError
+from stickslip.core.record import Record
+from stickslip.core.stream import Stream
 from stickslip.rigs.files import read_rig
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Limits, Measurement, setpoints
-from stickslip.stream import Stream
 from support.coulomb_rig import LIMITS, CoulombRig
 
 PD = Controller(pd(20.0, 0.2), torque_limit=0.95)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from test_ds402 import drive  # noqa: F401
 
-from stickslip.approval import allow_code
-from stickslip.errors import InputError, RigError
+from stickslip.core.code_approval import allow_code
+from stickslip.core.errors import InputError, RigError
 from stickslip.rigs.ds402 import Ds402
 from stickslip.rigs.files import read_rig
 from stickslip.rigs.kinds import rig_kind_names

@@ -14,12 +14,12 @@ from stickslip.control.compensator import Feedback
 from stickslip.control.composition import Settings
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
-from stickslip.model import Model
+from stickslip.core.spec import Surroundings
+from stickslip.models.model import Model
 from stickslip.rigs import safety
 from stickslip.rigs.loop_sample import COLUMNS, NAMES, control_of, decide, finished
 from stickslip.rigs.rig import Limits, Measurement, Setpoint
 from stickslip.rigs.safety import REASONS, RUNNING, STOPPED, guarded_by
-from stickslip.spec import Surroundings
 
 T = 1e-3
 TIME = safety.Safety._fields.index("time")

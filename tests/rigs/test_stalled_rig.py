@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from stickslip.errors import Interrupted, MessageLost
-from stickslip.record import Record
+from stickslip.core.errors import Interrupted, MessageLost
+from stickslip.core.record import Record
 from stickslip.rigs import loop as looping
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Measurement, setpoints

@@ -17,8 +17,8 @@ from test_loop import sine
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd
-from stickslip.errors import Interrupted
-from stickslip.record import Record
+from stickslip.core.errors import Interrupted
+from stickslip.core.record import Record
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Measurement, setpoints
 from support.axis_rig import LIMITS, AxisRig
@@ -122,7 +122,7 @@ MAIN = """
     import os, signal, sys
     sys.path.insert(0, {tests!r})
     from support.coulomb_rig import CoulombRig
-    from stickslip.errors import Interrupted
+    from stickslip.core.errors import Interrupted
     from stickslip.rigs.loop import Loop
     from stickslip.rigs.rig import setpoints
 

@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError, RecordFault
+from stickslip.core.errors import InputError, RecordFault
+from stickslip.core.record import Record
+from stickslip.core.stream import EXTENT, MAGIC, Stream
 from stickslip.readers import read
-from stickslip.record import Record
-from stickslip.stream import EXTENT, MAGIC, Stream
 
 UNITS = {"time": "s", "position": "rad", "temperature": "°C"}
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import InputError, ParameterError
-from stickslip.record import Record
+from stickslip.core.errors import InputError, ParameterError
+from stickslip.core.record import Record
 from stickslip.rigs.procedures import procedure
 from stickslip.rigs.procedures.base import perform
 from stickslip.rigs.virtual import virtual_rig

@@ -12,7 +12,7 @@ import stickslip.machines
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
 from stickslip.machines.files import machine
 from stickslip.machines.machine import IMPERFECTIONS
 from stickslip.rigs.files import read_rig

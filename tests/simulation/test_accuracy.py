@@ -9,7 +9,7 @@ from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation import accuracy
 from stickslip.simulation.closed_loop import prepare, simulate
 from stickslip.simulation.exact import engine as exact

@@ -10,9 +10,9 @@ import pytest
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, place
-from stickslip.errors import Divergence
+from stickslip.core.errors import Divergence
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from support.thesis_loops import CASES, INERTIA, METRICS, PARAMETERS, PLANT, misses, thesis_run
 

@@ -6,9 +6,9 @@ import pytest
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.case_arrays import COMPENSATOR_SCALE, PLANT_SCALE, STIFFNESS
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact

@@ -12,8 +12,8 @@ import pytest
 import stickslip as ss
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
-from stickslip.errors import ConfigError, ParameterError
-from stickslip.spec import Surroundings
+from stickslip.core.errors import ConfigError, ParameterError
+from stickslip.core.spec import Surroundings
 from stickslip.studies.study import load_run
 from support.sampled_text import Memory, sample, settings
 

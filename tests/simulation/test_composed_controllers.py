@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 
 INERTIA, TIME = 3.8623e-4, 1e-3
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "sigma2": 0.018}

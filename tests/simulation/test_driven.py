@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from stickslip import Controller, Gains, Model, Reference, RigidAxis, simulate
-from stickslip.errors import InputError
-from stickslip.plugins import law
+from stickslip.core.errors import InputError
+from stickslip.models.plugins import law
 from stickslip.simulation.recorded_input.simulation import (
     Course,
     Drive,

@@ -14,16 +14,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from stickslip.core.spec import Surroundings
 from stickslip.identification.observer.observer import GRASP, Motion, Prepared, prepare
 from stickslip.jit import compiled_lanes, exponential
 from stickslip.laws import LAWS
-from stickslip.model import Model
-from stickslip.plugins import law as law_named
+from stickslip.models.model import Model
+from stickslip.models.plugins import law as law_named
 from stickslip.simulation.recorded_input import segments as driven_lanes
 from stickslip.simulation.recorded_input import simd_batch
 from stickslip.simulation.recorded_input.branchless import Name, NotStraight, Trace, traced
 from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, drive_axis
-from stickslip.spec import Surroundings
 from stickslip.subset import law_layouts, lower
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

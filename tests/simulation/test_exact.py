@@ -11,16 +11,16 @@ import pytest
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, pid, place
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Bristle, Surroundings
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation import _forcing as forcing
 from stickslip.simulation._meter import gathered
 from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.case_arrays import DIVERGED, DONE, Case, Outcome, lay_out
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.exact import engine as exact
-from stickslip.spec import Bristle, Surroundings
 from support.thesis_loops import CASES, INERTIA, METRICS, PARAMETERS, PLANT, misses, thesis_run
 
 NAMES = ["rms_e", "max_e", "ss_e", "rms_ev", "rms_Tm", "rms_hp", "rev_per_s"]

@@ -9,7 +9,7 @@ from stickslip.control.compensator import Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.case_arrays import lay_out
 from stickslip.simulation.exact import engine as exact

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import StepFailure
+from stickslip.core.errors import StepFailure
 
 STEP = ss.Reference("step", amplitude=0.175, tau=1.43e-5)
 LIGHT = ss.RigidAxis(3.78e-4, ss.Model("coulomb", fc=0.14, sigma2=0.0028))

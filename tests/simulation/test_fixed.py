@@ -13,9 +13,9 @@ import pytest
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation._meter import gathered
 from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.case_arrays import DIVERGED, DONE, NOT_FINITE, lay_out

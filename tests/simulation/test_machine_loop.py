@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import stickslip as ss
-from stickslip.errors import Divergence, InputError, ParameterError
+from stickslip.core.errors import Divergence, InputError, ParameterError
 from stickslip.machines.contact import Bearings, Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.files import machine

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from stickslip.model import Reference
+from stickslip.models.model import Reference
 from stickslip.simulation._meter import HIGH_PASS, close_standstill, meter, new_meter, turning_points
 from stickslip.simulation.metrics import limit_cycle, metrics, settle_band_of
 

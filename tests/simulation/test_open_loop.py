@@ -10,10 +10,10 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pytest
 
-from stickslip.errors import InputError, StepFailure, UnknownName
-from stickslip.model import Model, Reference
+from stickslip.core.errors import InputError, StepFailure, UnknownName
+from stickslip.core.spec import Law, Par
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.prescribed.open_loop import respond
-from stickslip.spec import Law, Par
 
 TABLE = json.loads((Path(__file__).parents[1] / "data" / "open_loop.json").read_text())
 CURVE = {"fs": 0.335, "fc": 0.285, "vs": 0.01, "delta_s": 2.0, "sigma2": 0.018}

@@ -13,7 +13,7 @@ from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation._meter import HIGH_PASS
 from stickslip.simulation.case_arrays import DONE, MAX_STEP
 from stickslip.simulation.closed_loop import prepare

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip import plugins
-from stickslip.errors import Divergence, InputError, LawError
+from stickslip.core.errors import Divergence, InputError, LawError
+from stickslip.core.spec import Bristle
+from stickslip.models import plugins
 from stickslip.simulation.case_arrays import DONE
 from stickslip.simulation.sampled import engine as sampled
-from stickslip.spec import Bristle
 from support.places import REFERENCE, needs_reference
 from support.sampled_loops import (
     CONTROLLERS,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip import plugins
+from stickslip.models import plugins
 from stickslip.simulation.case_arrays import DONE
 from stickslip.simulation.sampled import engine as sampled
 from support.sampled_loops import CONTROLLERS, FAST, TIME, J, apart, case_of, on_grid, up_to_a_turn

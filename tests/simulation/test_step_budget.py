@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError, ModelRemark, StepFailure
+from stickslip.core.errors import InputError, ModelRemark, StepFailure
 from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.case_arrays import COLUMNS, NO_STEP, TOO_STIFF, Case, Outcome, StepBudget
 from stickslip.simulation.closed_loop import prepare
@@ -83,7 +83,7 @@ def test_a_step_whose_metrics_would_take_hours_ends_the_run():
 
 
 def test_more_samples_than_memory_holds_are_refused_before_the_run(monkeypatch):
-    monkeypatch.setattr("stickslip.capacity.free_memory", lambda: 1e9)
+    monkeypatch.setattr("stickslip.core.resources.free_memory", lambda: 1e9)
     axis, _, reference = loop(4e-4, 1.0)
     sampled = ss.Controller(ss.place("PD", 4e-4, 10.0, 1.0), sample_time=1e-8)
     with pytest.raises(

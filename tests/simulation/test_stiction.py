@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 
 TIMES = np.linspace(0.0, 20.0, 2001)

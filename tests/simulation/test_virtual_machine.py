@@ -14,7 +14,7 @@ from stickslip.machines.files import machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Amplifier
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.machine.layout import TOLERANCE, lay_out_machine, look, run, wait
 
@@ -131,7 +131,7 @@ def test_pause_advances_drift_and_cools():
 
 @pytest.mark.parametrize("law", ["coulomb", "karnopp", "stribeck", "lugre", "dahl", "maxwell_slip", "static"])
 def test_any_law_of_the_package_moves_and_stops(law):
-    from stickslip import plugins
+    from stickslip.models import plugins
 
     found = plugins.law(law)
     m = Machine("any", J, Contact(Model(found, {}, **found.example)))

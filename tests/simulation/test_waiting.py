@@ -11,13 +11,13 @@ import weakref
 import pytest
 
 import stickslip as ss
-from stickslip import waiting
+from stickslip.core import progress
+from stickslip.core.progress import Reached, Watch, watched
 from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.case_arrays import DONE, TOO_STIFF
 from stickslip.simulation.closed_loop import prepare
 from stickslip.simulation.exact import engine as exact
 from stickslip.simulation.fixed import engine as fixed
-from stickslip.waiting import Reached, Watch, watched
 
 LUGRE = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}
 
@@ -25,8 +25,8 @@ LUGRE = {"sigma0": 3.5e4, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.2
 @pytest.fixture
 def said(monkeypatch):
     lines: list[str] = []
-    monkeypatch.setattr(waiting, "_listeners", [])
-    waiting.listen(lines.append)
+    monkeypatch.setattr(progress, "_listeners", [])
+    progress.listen(lines.append)
     return lines
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from stickslip.control.catalogue import CATALOGUE, Belief, compensated
-from stickslip.errors import ConfigError, ParameterError, UnknownName
+from stickslip.core.errors import ConfigError, ParameterError, UnknownName
+from stickslip.core.record import Record
 from stickslip.machines.files import machine
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models.model import Model
 from stickslip.report.bench_report import table_of, write_bench_report
 from stickslip.studies.bench import BenchRun, planned, read_bench, run_bench
 from stickslip.studies.bench_decision import choices, knowledge_of, standings

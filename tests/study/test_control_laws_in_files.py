@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip.approval import allow_code
 from stickslip.cli import main
 from stickslip.contract.control_laws import examine
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
 from stickslip.control.registry import control_law
-from stickslip.errors import ConfigError
+from stickslip.core.code_approval import allow_code
+from stickslip.core.errors import ConfigError
 from stickslip.studies.study import execute, load, load_run
 from stickslip.sweeps.numbers import as_columns, known, value_of, varied
 

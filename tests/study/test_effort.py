@@ -10,10 +10,11 @@ import time
 import pytest
 
 import stickslip as ss
-from stickslip import capacity, cli
+from stickslip import cli
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.errors import InputError, SimulationError
+from stickslip.core import resources
+from stickslip.core.errors import InputError, SimulationError
 from stickslip.machines.rigid import RigidAxis
 from stickslip.simulation.closed_loop import simulate
 from stickslip.studies import study as studies
@@ -98,7 +99,7 @@ def test_a_sweep_beyond_memory_or_disk(tmp_path, monkeypatch):
     sweep = dataclasses.replace(whole, drawn=dataclasses.replace(whole.drawn, cases=10**9))
     with pytest.raises(InputError, match=r"closed loops in blocks .* memory|GB free"):
         execute.run(sweep, tmp_path / "out")
-    monkeypatch.setattr(capacity, "free_memory", lambda: 1e6)
+    monkeypatch.setattr(resources, "free_memory", lambda: 1e6)
     with pytest.raises(InputError, match=r"closed loops in blocks of 256 need .* of memory, 1 MB are free"):
         execute.run(sweep, tmp_path / "out")
     assert not (tmp_path / "out").exists()

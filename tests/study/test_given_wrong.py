@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError, ModelRemark
+from stickslip.core.errors import InputError, ModelRemark
 from stickslip.studies.rerun import rerun
 from support.given_studies import AXIS, CONTROLLERS, LUGRE, PD, SINE, base, read
 

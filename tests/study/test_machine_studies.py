@@ -12,7 +12,7 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.control.linear import place
-from stickslip.errors import ConfigError
+from stickslip.core.errors import ConfigError
 from stickslip.machines.files import LIBRARY, machine
 from stickslip.machines.machine import IMPERFECTIONS
 from stickslip.simulation.machine.loop import FINER, simulate_machine

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from stickslip.approval import allow_code
 from stickslip.cli import _output
-from stickslip.errors import CodeRefused
-from stickslip.model import Model
+from stickslip.core.code_approval import allow_code
+from stickslip.core.errors import CodeRefused
+from stickslip.models.model import Model
 from stickslip.report._view import StudyView
 from stickslip.report.html import notes
 from stickslip.studies import study as studies
@@ -20,7 +20,7 @@ DATA = Path(__file__).parents[1] / "data"
 LAW = '''
 """Viscous friction with a level of its own."""
 from typing import Annotated, NamedTuple
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 class Params(NamedTuple):
     """Its parameters."""

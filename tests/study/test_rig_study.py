@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import ConfigError, Interrupted
+from stickslip.core.errors import ConfigError, Interrupted
+from stickslip.core.record import Record
 from stickslip.machines.files import machine
-from stickslip.record import Record
 from stickslip.report import rig_report
 from stickslip.studies import study as studies
 from stickslip.studies.experiments import NOMINAL, ExperimentRun, ExperimentView, experiments_of, variant

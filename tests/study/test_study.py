@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from stickslip.errors import InputError
-from stickslip.record import Record
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.studies import study as studies
 from stickslip.studies.files import KEYS
 from stickslip.studies.plan import load, select

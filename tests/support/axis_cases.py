@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip import Model, Record
 from stickslip.identification.experiment import Experiment
-from stickslip.plugins import law
+from stickslip.models.plugins import law
 from stickslip.simulation.recorded_input.simulation import Drive, Loop, Mechanics, drive_axis
 
 INERTIA, FC, SIGMA2 = 4e-4, 0.285, 0.018  # thesis Tables 1 and 4, about

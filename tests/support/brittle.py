@@ -3,7 +3,7 @@
 import math
 from typing import Annotated, NamedTuple
 
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 
 class Params(NamedTuple):

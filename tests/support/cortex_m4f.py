@@ -13,12 +13,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from stickslip import plugins
+from stickslip.core.spec import Surroundings
 from stickslip.exports import c99
 from stickslip.exports.golden import golden
 from stickslip.exports.job import Job
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.models import plugins
+from stickslip.models.model import Model
 
 HERE = Path(__file__).parents[1] / "export" / "cortex"
 CORE = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")

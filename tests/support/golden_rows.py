@@ -7,7 +7,7 @@ import math
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.registry import control_law
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 INERTIA = 3.8623e-4
 W = 2.0 * math.pi * 20.0

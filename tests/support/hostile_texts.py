@@ -15,7 +15,7 @@ LAW = '''
 import math
 from typing import Annotated, NamedTuple
 
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 T = {text!r}
 

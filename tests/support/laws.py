@@ -1,6 +1,6 @@
 """Every registered law in every one of its choices."""
 
-from stickslip import plugins
+from stickslip.models import plugins
 
 
 def registered():

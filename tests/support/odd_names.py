@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from stickslip.spec import Law, Par
+from stickslip.core.spec import Law, Par
 
 PIECES = 3
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from stickslip.spec import Par
+from stickslip.core.spec import Par
 
 __all__ = ["Memory", "Settings"]
 

@@ -14,10 +14,10 @@ import types
 from collections.abc import Callable
 from typing import Any
 
-from stickslip.binding import rescoped
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
-from stickslip.spec import Law
+from stickslip.core.rebinding import rescoped
+from stickslip.core.spec import Law
 from support.sampled_numbers import Memory, Settings
 
 __all__ = [

@@ -2,8 +2,8 @@
 
 from typing import Annotated, NamedTuple
 
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Par
 
 
 class Params(NamedTuple):

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import stickslip as ss
-from stickslip.errors import SimulationError
+from stickslip.core.errors import SimulationError
 from support.places import ROOT
 
 FILE = ROOT / "tests" / "data" / "truth_loops.npz"

@@ -20,7 +20,7 @@ from axis_rig import AxisRig
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd
-from stickslip.errors import StickslipError
+from stickslip.core.errors import StickslipError
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Measurement, setpoints
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from stickslip.cli import main
-from stickslip.errors import ConfigError, InputError, LawError
+from stickslip.core.errors import ConfigError, InputError, LawError
 from stickslip.identification.estimate import Estimate, Identification
 from stickslip.identification.model_file import write_model
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.sweeps import execute
 from stickslip.sweeps.plan import load
 from support.sweeps import SMALL

@@ -8,7 +8,7 @@ import pytest
 from stickslip.cli import main
 from stickslip.identification.estimate import Estimate, Identification
 from stickslip.identification.model_file import write_model
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.sweeps.plan import load
 from stickslip.sweeps.sample import Drawn, Spread
 

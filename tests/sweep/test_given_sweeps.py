@@ -11,7 +11,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.sweeps.plan import load
 from stickslip.sweeps.rerun import rerun
 from stickslip.verbs.plain_given import file_of

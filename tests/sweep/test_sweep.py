@@ -15,7 +15,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
 from stickslip.simulation.adaptive import engine as adaptive
 from stickslip.simulation.sampled import engine as sampled
 from stickslip.sweeps import block, dataset, execute, forecast, measured, metric_check, numbers, summary

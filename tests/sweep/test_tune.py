@@ -9,7 +9,7 @@ import pytest
 
 from stickslip.cli import main
 from stickslip.cli import tune as help_of_tune
-from stickslip.errors import ConfigError, InputError
+from stickslip.core.errors import ConfigError, InputError
 from stickslip.sweeps import tune as tuning
 from stickslip.sweeps.measured import measured
 from stickslip.sweeps.plan import load

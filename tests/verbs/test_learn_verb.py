@@ -12,7 +12,7 @@ import pytest
 import stickslip as ss
 from stickslip.cli import main
 from stickslip.control.files import read_controller
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.machines.contact import Contact
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import Machine

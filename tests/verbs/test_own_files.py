@@ -9,7 +9,7 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.verbs.own_files import ours
 
 LAW = ss.Model("coulomb", fc=0.3, sigma2=0.01)

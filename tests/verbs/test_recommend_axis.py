@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stickslip as ss
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 LAW = {"sigma0": 3.5e3, "sigma1": 0.1, "sigma2": 0.018, "fs": 0.335, "fc": 0.285, "vs": 0.01}
 AXIS = ss.RigidAxis(4e-4, ss.Model("lugre", **LAW))

@@ -11,8 +11,8 @@ import pytest
 
 import stickslip as ss
 from stickslip.cli import main
-from stickslip.finding import Finding
-from stickslip.messages import name_option
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_option
 from support.written_log import written
 
 OPTION = re.compile(r"--[a-z]")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 from support.serving import DEMO, Served, drop
 
 pytestmark = pytest.mark.slow

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from stickslip.messages import Surface, name_option, render, shown_on
+from stickslip.core.messages import Surface, name_option, render, shown_on
 from stickslip.web.worker import outcome
 
 FORM = "under “Columns and units”"

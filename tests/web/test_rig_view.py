@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 from support.serving import Served
 
 pytestmark = pytest.mark.slow

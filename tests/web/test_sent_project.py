@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import stickslip as ss
-from stickslip.approval import approved_file
+from stickslip.core.code_approval import approved_file
 from support.serving import Served, ended, settled, start_server
 
 COULOMB = Path(str(ss.law("coulomb").step.__code__.co_filename)).read_text(encoding="utf-8")

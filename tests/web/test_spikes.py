@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 from stickslip.web.views import lay_out, plane, samples
 
 ROWS = 1_000_000

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.web.cases import descriptions, python_of, tables_of, toml_of
 from support.serving import Served
 

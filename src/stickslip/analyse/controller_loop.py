@@ -21,10 +21,10 @@ from stickslip.analyse.presliding_loop import describing
 from stickslip.analyse.slope_at_rest import SIZES, slope_at_rest
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Law, Par
 from stickslip.machines.drivetrain import FREE
-from stickslip.model import Model
-from stickslip.spec import Law, Par
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 AGREES = 0.2

@@ -15,10 +15,10 @@ from stickslip.analyse.stability import AMPLITUDES, SLOW, edge, stable
 from stickslip.analyse.stability_result import Cycle
 from stickslip.analyse.wording import quantity
 from stickslip.control.controller import Controller
-from stickslip.errors import ParameterError
-from stickslip.friction_levels import static_level
+from stickslip.core.errors import ParameterError
+from stickslip.core.messages import name_option, render
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
-from stickslip.messages import name_option, render
+from stickslip.models.friction_levels import static_level
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 MOST, LEAST = 100.0, 0.01

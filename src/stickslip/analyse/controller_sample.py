@@ -11,8 +11,8 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.plain import plain_sample
-from stickslip.errors import InputError
-from stickslip.spec import Surroundings
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Surroundings
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 CARRIED = (

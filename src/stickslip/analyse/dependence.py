@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from stickslip.analyse.spectrum import channel_of
-from stickslip.errors import InputError, ParameterError
-from stickslip.record import Record
+from stickslip.core.errors import InputError, ParameterError
+from stickslip.core.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

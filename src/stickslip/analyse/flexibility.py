@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.drivetrain import Chain, Modes, all_positive
 
 

@@ -20,7 +20,7 @@ from stickslip.analyse.controller_margins import slid
 from stickslip.analyse.presliding_loop import Axis, Loop, held
 from stickslip.control.controller import Controller
 from stickslip.control.learning import bin_response, low_pass, low_pass_response
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.machines.drivetrain import Drivetrain
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -16,7 +16,7 @@ import numpy as np
 from stickslip.analyse.controller_loop import linearised
 from stickslip.analyse.presliding_loop import Loop
 from stickslip.control.controller import Controller
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.drivetrain import Drivetrain
 
 Array = np.ndarray[Any, np.dtype[np.complex128]]

@@ -17,7 +17,7 @@ from stickslip.analyse.controller_loop import LinearController, linearised
 from stickslip.analyse.presliding_loop import Loop
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -16,9 +16,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from stickslip.control.linear import Gains
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.drivetrain import FREE, INPUTS, Drivetrain, LinearContact
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.prescribed.motion import Samples, packed_numbers, torque_along
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.analyse.controller_sample import Sample, suspects
-from stickslip.errors import InputError
-from stickslip.messages import name_command
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_command
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 SIZES = (1e-6, 1e-7, 1e-8, 1e-9, 1e-10)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 
 SAME = 1e-6
 """Relative change of the reference velocity that starts another run."""

@@ -38,9 +38,9 @@ from stickslip.analyse.stability_result import (
 )
 from stickslip.control.linear import Gains
 from stickslip.control.short_form import highest_corner
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -18,9 +18,9 @@ from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
-from stickslip import compiling, waiting
-from stickslip.approval import allow_code
-from stickslip.errors import (
+from stickslip.core import compile_notice, progress
+from stickslip.core.code_approval import allow_code
+from stickslip.core.errors import (
     BEYOND,
     InputError,
     Interrupted,
@@ -31,8 +31,8 @@ from stickslip.errors import (
     one_line,
     suggestion,
 )
-from stickslip.messages import Surface, shown_on
-from stickslip.rules import LARGEST_WHOLE
+from stickslip.core.messages import Surface, shown_on
+from stickslip.core.type_rules import LARGEST_WHOLE
 from stickslip.verbs.kinds import require
 
 VERBS = (
@@ -146,14 +146,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     _tolerate_any_terminal()
     _one_thread_for_algebra()
-    notice = compiling.Notice(sys.stderr)
+    notice = compile_notice.Notice(sys.stderr)
     if argv is None:
         _collect_seldom()
         if not sys.warnoptions:
             # NumPy's warnings are about numbers that are checked later; tests and python -W show them.
             warnings.filterwarnings("ignore", category=RuntimeWarning)
-        compiling.listen(notice)
-        waiting.listen(_tell)
+        compile_notice.listen(notice)
+        progress.listen(_tell)
     given = list(sys.argv[1:] if argv is None else argv)
     try:
         return _dispatch(given)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from stickslip.record import Record
+    from stickslip.core.record import Record
     from stickslip.verbs.reading import Opened, Reading
 
 
@@ -89,7 +89,7 @@ def read_record(path: Path, args: argparse.Namespace) -> Record:
     """
     import sys
 
-    from stickslip.messages import render
+    from stickslip.core.messages import render
     from stickslip.verbs.reading import open_log
 
     opened = open_log(path, reading_of(args))

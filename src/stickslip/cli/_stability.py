@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from stickslip.analyse.stability_result import Stability
     from stickslip.control.linear import Gains
     from stickslip.machines.machine import Machine
-    from stickslip.model import Model
+    from stickslip.models.model import Model
     from stickslip.studies.stability_map import Confirmed
 
 
@@ -96,7 +96,7 @@ def composed(
     from stickslip.analyse.controller_margins import controller_stability
     from stickslip.analyse.machine_axis import axis_of
     from stickslip.control.files import read_controller
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
 
     for name, usual in BESIDE.items():
         if getattr(args, name) != usual:
@@ -133,7 +133,7 @@ def composed(
 
 def machine_of(args: argparse.Namespace) -> Machine:
     """Return the machine without the imperfections switched off."""
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
     from stickslip.machines.files import machine
 
     if args.amplitude < 0.0 or any(f < 0.0 for f in args.filter):
@@ -144,7 +144,7 @@ def machine_of(args: argparse.Namespace) -> Machine:
 def described(args: argparse.Namespace) -> tuple[Machine, Gains, dict[str, Model]]:
     """Return the machine, the linear controller and the compensators' laws of the options."""
     from stickslip.control.linear import place
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
 
     plant = machine_of(args)
     inertia = plant.inertia if args.inertia is None else args.inertia
@@ -162,7 +162,7 @@ def computed(args: argparse.Namespace) -> Stability:
     from stickslip.analyse.presliding_loop import Drive
     from stickslip.analyse.stability import stability
     from stickslip.control.short_form import highest_corner
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
 
     plant, gains, models = described(args)
     drive = Drive(
@@ -178,7 +178,7 @@ def computed(args: argparse.Namespace) -> Stability:
 
 
 def _chosen(plant: Machine, names: list[str]) -> list[str]:
-    from stickslip.errors import InputError, UnknownName
+    from stickslip.core.errors import InputError, UnknownName
 
     for name in names:
         if name not in plant.models:

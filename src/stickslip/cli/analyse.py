@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from stickslip.cli import _files, _reading, _stability
 
 if TYPE_CHECKING:
-    from stickslip.record import Record
+    from stickslip.core.record import Record
 
 SUMMARY = (
     "analyse records, machines and models: spectrum, repeatability, flexibility, sides, position, stability"
@@ -43,7 +43,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the result; draw it."""
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
     from stickslip.report.plots import FORMATS
 
     if args.plot and args.plot.suffix not in FORMATS:
@@ -114,7 +114,7 @@ def _spectrum_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _spectrum(args: argparse.Namespace) -> None:
     from stickslip.analyse.spectrum import spectrum
-    from stickslip.config import named_numbers
+    from stickslip.core.config import named_numbers
 
     modes = named_numbers(args.mode, "--mode", "Hz", value="HZ")
     found = [
@@ -186,8 +186,8 @@ def _flexibility_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _flexibility(args: argparse.Namespace) -> None:
     from stickslip.analyse.flexibility import flexibility, shaft_stiffness
-    from stickslip.config import listed_numbers, named_numbers
-    from stickslip.errors import InputError
+    from stickslip.core.config import listed_numbers, named_numbers
+    from stickslip.core.errors import InputError
 
     springs = list(listed_numbers(args.stiffness, "--stiffness", "N·m/rad")) if args.stiffness else []
     for text in args.shaft:
@@ -301,7 +301,7 @@ def _attraction_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _attraction(args: argparse.Namespace) -> None:
     from stickslip.identification.presliding.attraction import apply_overshoot_rule
-    from stickslip.model import Model
+    from stickslip.models.model import Model
 
     found = apply_overshoot_rule(
         Model.from_file(args.model), velocity=args.velocity, rise_time=args.rise_time

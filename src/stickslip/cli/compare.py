@@ -30,7 +30,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the differences and the verdict."""
     from stickslip.cli import _output
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
     from stickslip.verbs.compare import compare
 
     if args.plot and args.plot.suffix not in (".png", ".svg"):

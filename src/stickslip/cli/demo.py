@@ -33,7 +33,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the three verbs and print each command."""
-    from stickslip.whole_files import prepared_folder
+    from stickslip.core.whole_files import prepared_folder
 
     log: Path = args.log or args.out / "demo.csv"
     prepared_folder(log.parent)
@@ -80,7 +80,7 @@ def copy_log(log: Path, force: bool) -> None:
     """
     from importlib.resources import files
 
-    from stickslip.whole_files import write_whole
+    from stickslip.core.whole_files import write_whole
 
     _files.refuse_foreign([log], force)
     write_whole(log, (files("stickslip") / "demo.csv").read_bytes())

@@ -109,8 +109,8 @@ def compensator_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the files; 1 if the check fails."""
     from stickslip.cli import _output
-    from stickslip.config import named_values
-    from stickslip.errors import InputError
+    from stickslip.core.config import named_values
+    from stickslip.core.errors import InputError
     from stickslip.exports import TARGETS, target_named
     from stickslip.exports.maps import MAP_TARGETS
     from stickslip.verbs.export import export

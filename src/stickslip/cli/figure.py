@@ -14,7 +14,7 @@ import argparse
 from pathlib import Path
 
 from stickslip.cli import _files
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 SUMMARY = "draw a figure of the thesis: phenomena of friction, fits of the sliding curve"
 

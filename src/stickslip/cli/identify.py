@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip.cli import _files, _reading
-from stickslip.errors import one_line
+from stickslip.core.errors import one_line
 from stickslip.identification.methods import METHODS
 
 if TYPE_CHECKING:
@@ -243,8 +243,8 @@ def values_given(options: Mapping[str, Sequence[str]]) -> dict[str, float]:
     InputError
         If two options give one parameter different values.
     """
-    from stickslip.config import named_numbers
-    from stickslip.errors import InputError
+    from stickslip.core.config import named_numbers
+    from stickslip.core.errors import InputError
 
     out: dict[str, float] = {}
     for option, pairs in options.items():
@@ -294,7 +294,7 @@ def as_data(result: IdentificationResult, made: Mapping[str, Path], answers: Ans
 
 def places(out: Path) -> tuple[Path, Path]:
     """Return the paths of model and report; create the folder."""
-    from stickslip.whole_files import prepared_folder
+    from stickslip.core.whole_files import prepared_folder
 
     if out.suffix == ".toml":
         prepared_folder(out.parent)

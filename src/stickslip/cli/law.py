@@ -8,8 +8,8 @@
     stickslip law --template friction > my_law.py     a complete small law as a template
     stickslip law --template control > my_loop.py     the same for a control law
 
-Where it is documented: help("stickslip.spec") and help("stickslip.control_spec") in Python; docs/howto/own_law.md and
-docs/howto/own_control_law.md in the source of the package.
+Where it is documented: help("stickslip.core.spec") and help("stickslip.core.control_spec") in Python;
+docs/howto/own_law.md and docs/howto/own_control_law.md in the source of the package.
 
 The picture shows the torque along a slow sine, in pre-sliding, and after steps in velocity.
 """
@@ -23,12 +23,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip.cli import _files
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 if TYPE_CHECKING:
-    from stickslip.control_spec import ControlLaw
-    from stickslip.model import Model
-    from stickslip.spec import Choice, Configurable, Field, Law
+    from stickslip.core.control_spec import ControlLaw
+    from stickslip.core.spec import Choice, Configurable, Field, Law
+    from stickslip.models.model import Model
 
 SUMMARY = "explain or check a friction or control law; print a template"
 TEMPLATES = ("friction", "control")
@@ -88,8 +88,8 @@ def template(kind: str) -> str:
 
 def named(name: str) -> Any:
     """Return the friction or control law of a name or file; if it is neither, the error is that of a friction law."""
-    from stickslip import plugins
     from stickslip.control.registry import control_law, control_law_names, law_or_control_law
+    from stickslip.models import plugins
 
     if name.endswith(".py"):
         return law_or_control_law(name)
@@ -185,8 +185,8 @@ def check(law: Any) -> int:
 
 def with_values(law: Law, settings: Sequence[str]) -> Model:
     """Return the law with its example's parameters and the values that were set."""
-    from stickslip.config import named_values
-    from stickslip.model import Model
+    from stickslip.core.config import named_values
+    from stickslip.models.model import Model
 
     given = {name: value_in(text) for name, text in named_values(settings, "--set").items()}
     names = {choice.name for choice in law.choices}

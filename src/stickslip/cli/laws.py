@@ -13,7 +13,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print one line per law: name, title, source."""
-    from stickslip import plugins
+    from stickslip.models import plugins
 
     rows = [(law.name, law.title, "; ".join(law.source)) for law in map(plugins.law, plugins.law_names())]
     widths = [max(len(row[i]) for row in rows) for i in range(2)]

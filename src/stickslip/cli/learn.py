@@ -44,9 +44,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Learn, print the errors, write the controller."""
     from stickslip.cli import _output
+    from stickslip.core.whole_files import prepared_folder
     from stickslip.studies.study import load_run
     from stickslip.verbs.learn import learn
-    from stickslip.whole_files import prepared_folder
 
     planned = load_run(args.file)
     out: Path = args.out or Path(f"{args.file.stem}-learned.toml")

@@ -44,8 +44,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the list, the machine, its file, or a template."""
     from stickslip.cli import _output
-    from stickslip.config import read_toml
-    from stickslip.errors import InputError
+    from stickslip.core.config import read_toml
+    from stickslip.core.errors import InputError
     from stickslip.machines import written
     from stickslip.machines.files import file_of, library, machine
     from stickslip.machines.identified import is_identified

@@ -226,7 +226,7 @@ def store(out: Path, result: RecommendationResult) -> tuple[Path | None, bool]:
     tuple of (Path or None, bool)
         The file written, and whether one was removed.
     """
-    from stickslip.config import read_toml
+    from stickslip.core.config import read_toml
 
     if result.chosen is not None or result.recommendation.instead is not None:
         return result.save(out), False
@@ -243,8 +243,8 @@ def writable(out: Path, model: Path, option: str) -> None:
     ------
     InputError
     """
-    from stickslip.errors import InputError
-    from stickslip.whole_files import prepared_folder
+    from stickslip.core.errors import InputError
+    from stickslip.core.whole_files import prepared_folder
 
     name = RECOMMENDED if option == "--out" else "recommendation.html"
     if os.path.realpath(out) == os.path.realpath(model):

@@ -25,9 +25,9 @@ def run(args: argparse.Namespace) -> int:
     """Print what differs; 1 if anything does."""
     if args.folder.name == "manifest.json" and args.folder.is_file():
         args.folder = args.folder.parent
-    from stickslip.capacity import insist_on_jobs
     from stickslip.cli import _output
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
+    from stickslip.core.resources import insist_on_jobs
     from stickslip.studies.rerun import rerun as rerun_study
     from stickslip.sweeps.rerun import is_sweep
     from stickslip.sweeps.rerun import rerun as rerun_sweep

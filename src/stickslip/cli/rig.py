@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from stickslip.commission.commission import Commissioned
-    from stickslip.finding import Finding
+    from stickslip.core.finding import Finding
     from stickslip.rigs.procedures.base import Performed, Plan, Procedure
     from stickslip.rigs.rig import Rig
 
@@ -125,8 +125,8 @@ def rig_of(args: argparse.Namespace) -> Rig:
     ------
     InputError
     """
-    from stickslip.config import named_numbers, read_toml
-    from stickslip.errors import InputError
+    from stickslip.core.config import named_numbers, read_toml
+    from stickslip.core.errors import InputError
     from stickslip.rigs.files import read_rig
     from stickslip.rigs.narrower_limits import limited
     from stickslip.rigs.virtual import virtual_rig
@@ -142,11 +142,11 @@ def rig_of(args: argparse.Namespace) -> Rig:
 def performed(args: argparse.Namespace) -> int:
     """Run `stickslip rig run`."""
     from stickslip.cli import _output
-    from stickslip.config import named_values
-    from stickslip.errors import InputError
+    from stickslip.core.config import named_values
+    from stickslip.core.errors import InputError
+    from stickslip.core.whole_files import prepared_folder
     from stickslip.rigs.procedures import procedure
     from stickslip.rigs.procedures.base import perform, planned
-    from stickslip.whole_files import prepared_folder
 
     kind = procedure(args.procedure)
     given = named_values(args.set, "--set")
@@ -179,7 +179,7 @@ def sensible(chosen: Procedure, given: Mapping[str, str]) -> None:
     ------
     InputError
     """
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
 
     for name, text in given.items():
         value: Any = getattr(chosen, name)
@@ -212,8 +212,8 @@ def commissioned(args: argparse.Namespace) -> int:
     from stickslip.commission.commission import commission
     from stickslip.commission.headline import headline
     from stickslip.commission.resume import RESULTS, claimed
-    from stickslip.errors import InputError
-    from stickslip.whole_files import prepared_folder
+    from stickslip.core.errors import InputError
+    from stickslip.core.whole_files import prepared_folder
 
     rig = rig_of(args)
     if args.dry_run:
@@ -298,7 +298,7 @@ def write_commissioned(
 
 def findings_of(performed: Performed) -> list[Finding]:
     """Return the acceptance checks of a procedure as findings for a report."""
-    from stickslip.finding import Finding
+    from stickslip.core.finding import Finding
 
     failed = [c for c in performed.checks if not c.passed]
     out = [Finding("warning", c.name, c.text) for c in failed]

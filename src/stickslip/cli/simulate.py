@@ -60,9 +60,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the record and print the metrics."""
     from stickslip.cli import _output
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
+    from stickslip.core.whole_files import prepared_folder
     from stickslip.studies.study import execute, load_run
-    from stickslip.whole_files import prepared_folder
 
     planned = load_run(args.file)
     out: Path = args.out or Path(f"{args.file.stem}.npz")

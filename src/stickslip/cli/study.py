@@ -16,7 +16,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip.errors import InputError, Interrupted
+from stickslip.core.errors import InputError, Interrupted
 
 if TYPE_CHECKING:
     from stickslip.studies.plan import Study

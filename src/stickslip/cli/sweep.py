@@ -62,7 +62,7 @@ def announced(sweep: Sweep, jobs: int) -> Sweep:
 def run(args: argparse.Namespace) -> int:
     """Run, print the summary, draw the figures."""
     from stickslip.cli import _output
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
     from stickslip.sweeps import execute
     from stickslip.sweeps.plan import load
     from stickslip.verbs.sweep import sweep, sweep_of

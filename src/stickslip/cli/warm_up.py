@@ -17,9 +17,9 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
-from stickslip.arguments import arguments_checked
 from stickslip.cli.demo import LOOP as LOOP_OF_LOG
-from stickslip.errors import StickslipError
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.errors import StickslipError
 
 SUMMARY = "compile everything once after installation"
 LOOPS = {
@@ -88,9 +88,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the steps and print their durations; return 1 if one failed."""
-    from stickslip import compiling
+    from stickslip.core import compile_notice
 
-    compiling.silence()  # printed by this verb itself
+    compile_notice.silence()  # printed by this verb itself
     return 1 if failures(lambda text, end: print(text, end=end, flush=True)) else 0
 
 

@@ -42,7 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until interrupted."""
-    from stickslip.errors import InputError
+    from stickslip.core.errors import InputError
 
     if not 0 <= args.port < 65536:
         raise InputError(f"--port {args.port} must be a number from 0 to 65535")

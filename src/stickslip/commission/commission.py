@@ -22,7 +22,7 @@ from stickslip.commission.recommended import SLOWER, Following, TrackedRecommend
 from stickslip.commission.result import Stage, result_of
 from stickslip.commission.resume import kept, stamped
 from stickslip.commission.stiffness import joined_model, resolved, with_lag, with_stiffness
-from stickslip.errors import InputError, LimitCrossed
+from stickslip.core.errors import InputError, LimitCrossed
 from stickslip.identification.cogging import identify_cogging
 from stickslip.identification.estimate import Identification
 from stickslip.identification.experiment import experiment_of
@@ -37,7 +37,7 @@ from stickslip.identification.steady_friction.position_dependence import identif
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.rigs.procedures.attraction import Attraction
 from stickslip.rigs.procedures.base import CheckFailed, Performed, Plan, Procedure, perform
 from stickslip.rigs.procedures.breakaway import Breakaway

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identification.steady_friction.choice import choose_sliding
 from stickslip.identification.steady_friction.curve import identify_sliding
 from stickslip.identification.steady_friction.points import SlidingPoints
 from stickslip.identification.steady_friction.segments import Segment, constant_velocity_segments
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models.model import Model
 from stickslip.rigs.procedures.resting import RESTING, resting
 from stickslip.simulation.prescribed.steady import Steady
 

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identification.presliding.hysteresis import Loop, correlation_lags
 from stickslip.machines.angle import AngleMap, harmonic_sum
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models.model import Model
 from stickslip.simulation.prescribed.motion import Along
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

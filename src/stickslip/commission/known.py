@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, cast
 
+from stickslip.core.record import Record, encoder_step
 from stickslip.identification.response.drivetrain import FittedDrivetrain
 from stickslip.identification.response.nyquist import Fastest
 from stickslip.machines.angle import AngleMap
@@ -18,13 +19,12 @@ from stickslip.machines.contact import Contact, Drift
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.machine import LONGEST_DELAY, Machine
 from stickslip.machines.motor import Amplifier
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation.candidate_run import Drive
 from stickslip.recommendation.plant import WholeMachine
 from stickslip.recommendation.question import laws_of
 from stickslip.recommendation.recommend import recommend_on
 from stickslip.recommendation.recommendation import Recommendation
-from stickslip.record import Record, encoder_step
 from stickslip.rigs.procedures.moves import ROOM
 from stickslip.rigs.procedures.track import REFERENCES
 from stickslip.rigs.rig import Rig

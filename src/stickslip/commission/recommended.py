@@ -19,13 +19,13 @@ import numpy as np
 from stickslip.analyse.tracking import tracking_metrics
 from stickslip.commission.known import LEVELS, MARGIN, Known, laws_to_try
 from stickslip.control.controller import Controller
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Identification, Picture, Trace
 from stickslip.identification.model_file import write_model
 from stickslip.machines.angle import AngleMap
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation.file import recommended_table
 from stickslip.recommendation.recommendation import Recommendation
-from stickslip.record import Record
 from stickslip.rigs.procedures.base import Performed, Plan
 from stickslip.rigs.procedures.track import REFERENCES, Track
 from stickslip.rigs.rig import Rig

@@ -13,7 +13,7 @@ from stickslip.commission.recommended import TrackedRecommendation, picture_of_c
 from stickslip.identification.estimate import Estimate, Identification, Picture
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.position_map import PositionMap
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.rigs.procedures.base import Performed
 from stickslip.simulation.recorded_input.simulation import Mechanics
 

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from stickslip.errors import InputError
-from stickslip.messages import name_option
-from stickslip.record import Record
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
+from stickslip.core.record import Record
 from stickslip.rigs.procedures.base import Check, Performed, Procedure
 from stickslip.rigs.rig import Rig
 

@@ -10,12 +10,12 @@ from typing import Any, cast
 
 import numpy as np
 
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Estimate, Identification
 from stickslip.identification.fit.student import student_quantile
 from stickslip.identification.monte_carlo import WIDEST
 from stickslip.identification.presliding.attraction import apply_overshoot_rule
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]

@@ -1,8 +1,8 @@
 """The contract of a law: what the engines, identification and the exports rely on, held against one law.
 
-What a law promises is in the docstring of `stickslip.spec`. `examine` tries it on laws of anyone, with their own
+What a law promises is in the docstring of `stickslip.core.spec`. `examine` tries it on laws of anyone, with their own
 sources and units; the package's tests hold its own laws to the same functions over more cases. The short form that runs
-when a law from outside is first used is `stickslip.trial`.
+when a law from outside is first used is `stickslip.core.smoke_test`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from stickslip.contract.exports import EXPORTS, exported, single_precision
 from stickslip.contract.torques import bounded, compiled, no_length
 from stickslip.contract.units import units
 from stickslip.contract.verdict import Verdict, failed
-from stickslip.spec import Law
+from stickslip.core.spec import Law
 
 CHECKS: tuple[Callable[[Law], Verdict], ...] = (
     description, subset, bounds, units, no_length, compiled, bounded, dissipation, step_against_rate,

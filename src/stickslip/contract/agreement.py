@@ -11,12 +11,12 @@ from stickslip.contract.motions import Array, U, example
 from stickslip.contract.verdict import Verdict, failed, held, not_tried
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.errors import StickslipError
+from stickslip.core.errors import StickslipError
+from stickslip.core.spec import Bristle, Law
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.prescribed.open_loop import respond
-from stickslip.spec import Bristle, Law
 
 LONG, POINTS = 0.6, 60
 """Length of the motion, s, and the moments at which its torques are compared."""

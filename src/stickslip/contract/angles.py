@@ -8,10 +8,10 @@ from dataclasses import replace
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
-from stickslip.binding import bound
 from stickslip.contract.specimens import LIMIT, Array, Plain, clean_motion, specimen
 from stickslip.contract.verdict import Verdict, failed, held
-from stickslip.control_spec import ControlLaw
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.rebinding import bound
 
 TURN = 2.0 * math.pi
 TAKES, GIVES = ("sin", "cos", "tan"), ("asin", "acos", "atan", "atan2")

@@ -1,7 +1,7 @@
 """The contract of a control law: what the composition, the engines and the exports rely on, held against one law.
 
-What a law promises is in the docstring of `stickslip.control_spec`. Each law is tried in its place in a controller: a
-friction law is put where it needs one, and a PD where it is no loop itself.
+What a law promises is in the docstring of `stickslip.core.control_spec`. Each law is tried in its place in a
+controller: a friction law is put where it needs one, and a PD where it is no loop itself.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.control.read_law import insist_on_subset
 from stickslip.control.registry import control_law
-from stickslip.control_spec import ControlLaw
-from stickslip.errors import LawError
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.errors import LawError
+from stickslip.core.spec import Field, Surroundings
 from stickslip.exports import c99_controller
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.compiled_controller import compiled
-from stickslip.spec import Field, Surroundings
 from stickslip.subset import lower
 
 __all__ = ["CHECKS", "Plain", "block_of", "examine", "specimen", "variants"]

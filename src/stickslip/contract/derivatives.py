@@ -8,8 +8,8 @@ import numpy as np
 
 from stickslip.contract.motions import Array, batch, example
 from stickslip.contract.verdict import Verdict, failed, held
-from stickslip.errors import ParameterError
-from stickslip.spec import Law
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Law
 
 WIDTHS = 1e-3, 1e-4
 """Changes of a parameter over its value; both tell the same derivative where the torque is smooth."""

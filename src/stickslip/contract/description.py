@@ -8,9 +8,9 @@ from typing import Any
 
 from stickslip.contract.motions import name_of, variants
 from stickslip.contract.verdict import Verdict, failed, held
-from stickslip.control_spec import ControlLaw
-from stickslip.errors import LawError, ParameterError
-from stickslip.spec import COMPILED, Configurable, Law, Mode
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.errors import LawError, ParameterError
+from stickslip.core.spec import COMPILED, Configurable, Law, Mode
 from stickslip.subset import law_layouts, lower
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip.contract.motions import Array, batch, example, name_of, nearby, seeded, swings, tried
 from stickslip.contract.verdict import Verdict, failed, held, not_tried
-from stickslip.spec import Law
+from stickslip.core.spec import Law
 
 CASES = 8
 TRAPEZOID = 0.02

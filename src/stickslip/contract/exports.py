@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from stickslip.contract.verdict import Verdict, held, not_tried
+from stickslip.core.spec import Law
 from stickslip.exports import TARGETS, target_named
 from stickslip.exports.job import CannotCarry, Job
-from stickslip.model import Model
-from stickslip.spec import Law
+from stickslip.models.model import Model
 
 
 def exported(law: Law, name: str) -> Verdict:

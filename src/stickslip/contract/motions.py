@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
+from stickslip.core.spec import Law, Surroundings
 from stickslip.jit import call_step, compiled_step, flat, kernel, pointer
 from stickslip.laws import COMMON_CHOICES
-from stickslip.spec import Law, Surroundings
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

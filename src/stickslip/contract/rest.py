@@ -11,7 +11,7 @@ from stickslip.contract.specimens import COUNT, motion, replayed, specimen
 from stickslip.contract.verdict import Verdict, failed, held
 from stickslip.control.composition import MEMORY
 from stickslip.control.controller import Controller
-from stickslip.control_spec import ControlLaw
+from stickslip.core.control_spec import ControlLaw
 from stickslip.simulation.compiled_controller import Sampled, compiled
 from stickslip.subset import named
 

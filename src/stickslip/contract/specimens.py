@@ -10,11 +10,11 @@ import numpy as np
 
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
-from stickslip.control_spec import ControlLaw
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Surroundings
 from stickslip.exports.golden import random_motion
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.compiled_controller import FAULT, Sampled, replay
-from stickslip.spec import Surroundings
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TIME, LIMIT = 1e-3, 1.0

@@ -20,8 +20,8 @@ from stickslip.contract.motions import (
     tried,
 )
 from stickslip.contract.verdict import Verdict, failed, held
-from stickslip.spec import Law
-from stickslip.trial import complaint
+from stickslip.core.smoke_test import complaint
+from stickslip.core.spec import Law
 
 CASES, MOTIONS = 10, 30
 """Parameter sets of a law and option, and motions of each."""

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 from stickslip.contract.motions import example
 from stickslip.contract.verdict import Verdict, failed, held, not_tried
-from stickslip.errors import ParameterError
-from stickslip.spec import Field, Law, Surroundings
-from stickslip.trial import moments
+from stickslip.core.errors import ParameterError
+from stickslip.core.smoke_test import moments
+from stickslip.core.spec import Field, Law, Surroundings
 
 POWERS = {"²": "2", "³": "3", "⁴": "4", "⁻¹": "-1", "⁻²": "-2"}
 WORD = re.compile(r"(N|m|rad|s|kg|J|W|Hz|K|°C|-|1)(?:\^(-?\d+(?:\.\d+)?))?")

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from stickslip.binding import NEGATIVE
-from stickslip.errors import ParameterError
-from stickslip.friction_levels import Levels, levels_of
-from stickslip.model import Model
+from stickslip.core.errors import ParameterError
+from stickslip.core.rebinding import NEGATIVE
+from stickslip.models.friction_levels import Levels, levels_of
+from stickslip.models.model import Model
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,8 @@ BENDS = 1e-3
 
 
 def believed(model: Model, inertia: float, **more: Any) -> Belief:
-    """The belief by whichever friction law is known: a LuGre law of its levels (`stickslip.friction_levels`), of both
-    directions where they differ; a GMS law is kept besides.
+    """The belief by whichever friction law is known: a LuGre law of its levels (`stickslip.models.friction_levels`), of
+    both directions where they differ; a GMS law is kept besides.
 
     Parameters
     ----------

@@ -9,14 +9,14 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from stickslip.arguments import arguments_checked
 from stickslip.control.read_law import read
 from stickslip.control.registry import control_law
-from stickslip.control_spec import ControlLaw
-from stickslip.errors import ParameterError
-from stickslip.model import Model
-from stickslip.spec import Field, Law
-from stickslip.values import call_of
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.errors import ParameterError
+from stickslip.core.reprs import call_of
+from stickslip.core.spec import Field, Law
+from stickslip.models.model import Model
 
 HELD = "friction"
 """The part of a block's state and parameters that is the friction law's."""
@@ -62,7 +62,7 @@ class ControlBlock:
             example={"kp": 6.0, "kd": 0.1},
         )
 
-    The signals ``y``, and what else a law may have: ``help("stickslip.control_spec")``, and
+    The signals ``y``, and what else a law may have: ``help("stickslip.core.control_spec")``, and
     docs/howto/own_control_law.md in the source of the package.
     """
 

@@ -16,8 +16,8 @@ from stickslip.control import registry
 from stickslip.control.belief import Belief
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
-from stickslip.errors import ParameterError, UnknownName
-from stickslip.model import Model
+from stickslip.core.errors import ParameterError, UnknownName
+from stickslip.models.model import Model
 
 LOOPS = ("PD", "PID")
 DAMPING = 1.0

@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
-from stickslip.arguments import arguments_checked
 from stickslip.control.block import ControlBlock, fields_in, state_fields_in, within
 from stickslip.control.calls import calls_of, deviations_of
 from stickslip.control.composition import MEMORY, Settings, functions_with
 from stickslip.control.own_loop import ReferenceVelocity
 from stickslip.control.plain import plain_sample
-from stickslip.errors import ParameterError, suggestion
-from stickslip.spec import Field, Kept, Learned, Surroundings, fields_of, packed
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.errors import ParameterError, suggestion
+from stickslip.core.spec import Field, Kept, Learned, Surroundings, fields_of, packed
 from stickslip.subset import Layout
 from stickslip.subset.layout import PARAMETER
 

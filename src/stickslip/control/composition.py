@@ -1,7 +1,7 @@
 """One sample of a controller made of control laws: measure, feed forward, observe, control, limit.
 
 Written in the scalar subset (`stickslip.subset`). Arguments: settings ``n``, memory ``m`` (which begins with
-what the laws see: `stickslip.control_spec.Signals`), and the laws' states ``z`` and parameters ``p``, each law
+what the laws see: `stickslip.core.control_spec.Signals`), and the laws' states ``z`` and parameters ``p``, each law
 a part of them; surroundings ``u``. The functions `estimate`, `feedforwards`, `accelerations`, `observers`,
 `loops` and `left_over` call the laws of one controller; `stickslip.control.composed` writes them.
 
@@ -18,9 +18,9 @@ import types
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.binding import rescoped
-from stickslip.control_spec import Signals
-from stickslip.spec import Field, Par, fields_of
+from stickslip.core.control_spec import Signals
+from stickslip.core.rebinding import rescoped
+from stickslip.core.spec import Field, Par, fields_of
 
 TURN = 2.0 * math.pi  # rad
 LARGEST = 1e9  # rad, rad/s, N·m: an input beyond it is no measurement

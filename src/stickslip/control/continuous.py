@@ -1,6 +1,6 @@
 """Control laws in continuous time: what the exact, the adaptive and the fixed integrator take.
 
-A law has a continuous form where it declares one (`stickslip.control_spec.ControlLaw.continuous`).
+A law has a continuous form where it declares one (`stickslip.core.control_spec.ControlLaw.continuous`).
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from stickslip.control.block import ControlBlock
 from stickslip.control.linear import Compensation, Gains
-from stickslip.errors import ParameterError
-from stickslip.model import Model
+from stickslip.core.errors import ParameterError
+from stickslip.models.model import Model
 
 
 class Continuous(NamedTuple):

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, cast
 
-from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
 from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Compensator
 from stickslip.control.composed import Composed
@@ -17,10 +16,11 @@ from stickslip.control.continuous import Continuous, continuous_form, refuse_win
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import ReferenceVelocity
 from stickslip.control.short_form import laws_meant, refuse_continuous, refuse_short
-from stickslip.control_spec import PLACES, ControlLaw
-from stickslip.errors import ModelRemark, ParameterError
-from stickslip.model import Model, level_of_caller
-from stickslip.values import making
+from stickslip.core.arguments import arguments_checked, constructor_named, insist_on_own
+from stickslip.core.control_spec import PLACES, ControlLaw
+from stickslip.core.errors import ModelRemark, ParameterError
+from stickslip.core.reprs import making
+from stickslip.models.model import Model, level_of_caller
 
 Blocks = ControlBlock | Sequence[ControlBlock] | None
 STANDARD = {

@@ -30,16 +30,16 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from stickslip.config import Table, read_toml
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.own_loop import REFERENCE_VELOCITIES, REFERENCE_VELOCITY, ReferenceVelocity
 from stickslip.control.registry import control_law, control_law_names, law_files
 from stickslip.control.short_tables import OF_GAINS, Placement, compensator_in, gains_in, placement
-from stickslip.control_spec import PLACES, ControlLaw
-from stickslip.errors import ConfigError, ModelRemark
-from stickslip.model import Model
-from stickslip.model_tables import models, refuse_unknown
+from stickslip.core.config import Table, read_toml
+from stickslip.core.control_spec import PLACES, ControlLaw
+from stickslip.core.errors import ConfigError, ModelRemark
+from stickslip.models.model import Model
+from stickslip.models.tables import models, refuse_unknown
 
 NUMERICS = ("integrator", "tolerance", "time_step", "output")
 """Keys of a controller's table that are not the controller's: how a simulation integrates it."""

@@ -14,10 +14,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
-from stickslip.config import read_toml
 from stickslip.control.controller import Controller
-from stickslip.errors import InputError
-from stickslip.whole_files import write_whole
+from stickslip.core.config import read_toml
+from stickslip.core.errors import InputError
+from stickslip.core.whole_files import write_whole
 
 WIDTH = 1.96
 """Standard deviations of half an interval that holds 95 of 100 times."""

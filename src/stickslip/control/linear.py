@@ -13,11 +13,11 @@ import functools
 import math
 from typing import Annotated, Any, NamedTuple, TypeVar
 
-from stickslip.arguments import arguments_checked, constructor_checked
-from stickslip.errors import ParameterError
-from stickslip.rules import is_number
-from stickslip.spec import Par, fields_of
-from stickslip.values import making
+from stickslip.core.arguments import arguments_checked, constructor_checked
+from stickslip.core.errors import ParameterError
+from stickslip.core.reprs import making
+from stickslip.core.spec import Par, fields_of
+from stickslip.core.type_rules import is_number
 
 K = TypeVar("K")
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from stickslip.config import named_numbers, named_values
 from stickslip.control.linear import Cascade, Gains
-from stickslip.errors import InputError, UnknownName
-from stickslip.messages import name_option
+from stickslip.core.config import named_numbers, named_values
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import name_option
 
 ReferenceVelocity = Literal["difference", "instant"]
 """How a drive forms its reference velocity: from the last two reference positions, or the trajectory's own velocity at

@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-from stickslip.errors import LawError
+from stickslip.core.errors import LawError
 
 
 def plain_sample(sample: Callable[..., float], *given: Any) -> float:

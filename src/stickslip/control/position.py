@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from stickslip.control.block import ControlBlock
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.position_map import PositionMap
 
 NEVER = 1e-9

@@ -9,10 +9,10 @@ import types
 from collections.abc import Callable
 from typing import Any
 
-from stickslip.control_spec import ControlLaw, Signals
-from stickslip.errors import LawError
-from stickslip.origin import TEXT
-from stickslip.spec import Surroundings, fields_of
+from stickslip.core.control_spec import ControlLaw, Signals
+from stickslip.core.errors import LawError
+from stickslip.core.pickling import TEXT
+from stickslip.core.spec import Surroundings, fields_of
 from stickslip.subset import Layout, lower
 from stickslip.subset.layout import INPUT, PARAMETER, SURROUNDINGS
 from stickslip.subset.source import arguments_of, source_of

@@ -12,15 +12,15 @@ from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from stickslip.config import Table, read_toml
 from stickslip.control.compensator import COMPENSATORS, Compensator
 from stickslip.control.controller import Controller
 from stickslip.control.files import reference_velocity_in
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.control.own_loop import ReferenceVelocity
-from stickslip.errors import InputError
-from stickslip.model import Model
-from stickslip.spec import fields_of
+from stickslip.core.config import Table, read_toml
+from stickslip.core.errors import InputError
+from stickslip.core.spec import fields_of
+from stickslip.models.model import Model
 
 
 @dataclass(frozen=True)

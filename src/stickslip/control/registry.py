@@ -9,15 +9,15 @@ from __future__ import annotations
 import importlib
 import os
 
-from stickslip import plugins
-from stickslip.arguments import arguments_checked
-from stickslip.config import Table
 from stickslip.control.estimators import ESTIMATORS
 from stickslip.control.laws import CONTROL_LAWS
 from stickslip.control.read_law import read
-from stickslip.control_spec import ControlLaw
-from stickslip.errors import ConfigError, LawError
-from stickslip.spec import Law
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.config import Table
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.errors import ConfigError, LawError
+from stickslip.core.spec import Law
+from stickslip.models import plugins
 
 BUILT_IN = {"stickslip.control.laws": CONTROL_LAWS, "stickslip.control.estimators": ESTIMATORS}
 """Folders of one file a law, and the names there"""

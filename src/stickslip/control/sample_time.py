@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from stickslip.control.controller import Controller
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 
 
 def sampled_by(controller: Controller, sample_time: float, owner: str) -> Controller:

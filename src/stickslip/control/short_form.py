@@ -7,12 +7,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from stickslip.arguments import no_number
 from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Compensator
 from stickslip.control.linear import Cascade, Gains
-from stickslip.errors import ParameterError
-from stickslip.rules import is_number
+from stickslip.core.arguments import no_number
+from stickslip.core.errors import ParameterError
+from stickslip.core.type_rules import is_number
 
 FILTER_ROOM = 0.495  # of the sample rate: just below half of it, where a sampled low-pass ends
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from stickslip.config import Table
 from stickslip.control.compensator import COMPENSATORS, Compensator
 from stickslip.control.linear import LINEAR, Cascade, Gains, place
-from stickslip.errors import ConfigError
-from stickslip.model import Model
+from stickslip.core.config import Table
+from stickslip.core.errors import ConfigError
+from stickslip.models.model import Model
 
 OF_GAINS = ("linear", "gains", "cascade")
 """Keys of which one says the linear part."""

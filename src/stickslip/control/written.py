@@ -12,9 +12,9 @@ from stickslip.control.compensator import Compensator
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade
 from stickslip.control.registry import control_law_names
-from stickslip.control_spec import PLACES, ControlLaw
-from stickslip.model import Model
-from stickslip.model_tables import written
+from stickslip.core.control_spec import PLACES, ControlLaw
+from stickslip.models.model import Model
+from stickslip.models.tables import written
 
 NameOf = Callable[[Model], str]
 """Gives a friction law the name under which a controller's table calls it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from stickslip.errors import UnknownName
+from stickslip.core.errors import UnknownName
 
 if TYPE_CHECKING:
     from stickslip.exports.controllers import ControllerTarget

@@ -11,7 +11,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from stickslip.errors import LawError
+from stickslip.core.errors import LawError
 
 Kind = Literal["real", "int", "bool"]
 

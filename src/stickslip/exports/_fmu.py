@@ -21,13 +21,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from stickslip.core.messages import in_linear_units
+from stickslip.core.spec import Field, Surroundings
 from stickslip.exports import c99
 from stickslip.exports._analysis import fields_read
 from stickslip.exports._c import safe
 from stickslip.exports._text import Code, render
 from stickslip.exports.job import Job
-from stickslip.messages import in_linear_units
-from stickslip.spec import Field, Surroundings
 
 VERSIONS = {"2.0": "fmi2", "3.0": "fmi3"}
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-builtin", "-fPIC", "-shared", "-fvisibility=hidden")

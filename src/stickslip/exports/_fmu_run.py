@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import axis_unit
 from stickslip.exports.job import Check, Export
-from stickslip.messages import axis_unit
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -10,9 +10,9 @@ import ast
 from collections.abc import Mapping
 
 from stickslip.control.composition import LARGEST
+from stickslip.core.messages import axis_unit
 from stickslip.exports._analysis import fields_read
 from stickslip.exports._text import first_line
-from stickslip.messages import axis_unit
 
 REFUSES = "At an input that is not finite the torque is 0 and the state does not change."
 CLOCK = 1e-6

@@ -9,7 +9,7 @@ import ast
 import copy
 from collections.abc import Mapping, Sequence
 
-from stickslip.errors import LawError
+from stickslip.core.errors import LawError
 from stickslip.exports._analysis import Facts, analyse
 
 

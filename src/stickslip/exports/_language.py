@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from stickslip.errors import LawError
+from stickslip.core.errors import LawError
 from stickslip.exports._analysis import Facts, Kind, kind_of
 
 ADDITIVE, MULTIPLICATIVE, UNARY, POWER, ATOM = 6, 7, 8, 9, 10

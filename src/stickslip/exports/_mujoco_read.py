@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 MAIN = "main"
 ELSEWHERE = (

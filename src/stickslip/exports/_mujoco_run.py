@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.exports.nearest import Curve
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

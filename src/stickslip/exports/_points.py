@@ -9,8 +9,8 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from stickslip.core.spec import Law, Par, Surroundings
 from stickslip.exports.nearest import Curve, Form
-from stickslip.spec import Law, Par, Surroundings
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Finish = Callable[[dict[str, list[float]]], dict[str, list[float]]]

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.friction_levels import bends_of, end_of_slope, independent, static_level
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.core.spec import Surroundings
+from stickslip.models.friction_levels import bends_of, end_of_slope, independent, static_level
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

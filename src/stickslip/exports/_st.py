@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from stickslip.errors import LawError
+from stickslip.core.errors import LawError
 from stickslip.exports._analysis import Facts, analyse
 from stickslip.exports._decided import decided
 from stickslip.exports._language import ADDITIVE, AND, ATOM, CONDITION, MULTIPLICATIVE, NOT, OR, Language

@@ -12,8 +12,8 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from stickslip.model import Model
-from stickslip.spec import Law, Surroundings
+from stickslip.core.spec import Law, Surroundings
+from stickslip.models.model import Model
 
 SPEED, FREQUENCY = 2.0, 1.0  # rad/s, Hz: of the sine whose reversal is looked at
 PARTS = 4

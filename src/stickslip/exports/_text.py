@@ -14,13 +14,13 @@ import textwrap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from stickslip.messages import axis_unit
+from stickslip.core.messages import axis_unit
 
 if TYPE_CHECKING:
     import jinja2
 
-    from stickslip.control_spec import ControlLaw
-    from stickslip.spec import Law
+    from stickslip.core.control_spec import ControlLaw
+    from stickslip.core.spec import Law
 
 LETTERS = {
     "·": "*", "²": "^2", "³": "^3", "°": "deg", "µ": "u", "μ": "u", "−": "-", "–": "-", "×": "x", "≤": "<=",

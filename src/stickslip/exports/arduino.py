@@ -8,13 +8,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from stickslip.core.messages import axis_unit
+from stickslip.core.spec import Surroundings
 from stickslip.exports import c99
 from stickslip.exports._c import HEADERS
 from stickslip.exports._text import render
 from stickslip.exports.job import Check, Export, Job
 from stickslip.exports.target import Target
-from stickslip.messages import axis_unit
-from stickslip.spec import Surroundings
 
 STUB = """/* What the example needs of Arduino.h. */
 #include <stdint.h>

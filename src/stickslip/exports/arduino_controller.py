@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from stickslip.control.controller import Controller
+from stickslip.core.spec import Surroundings
 from stickslip.exports import c99_controller
 from stickslip.exports._text import render
 from stickslip.exports.arduino import tried
 from stickslip.exports.controllers import STILL, ControllerTarget, head_of
 from stickslip.exports.job import Export
-from stickslip.spec import Surroundings
 
 
 def write(controller: Controller, name: str, single: bool = True, around: Surroundings = STILL) -> Export:

@@ -17,13 +17,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.errors import InputError, ParameterError
+from stickslip.core.messages import name_setting
 from stickslip.exports._text import render
 from stickslip.exports.job import CannotCarry, Check, Export, Job
 from stickslip.exports.nearest import COULOMB, STRIBECK, Curve, Nearest, carried
 from stickslip.exports.target import Setting, Target, settings_of
-from stickslip.messages import name_setting
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 KEYS = {
     "friction_base": "N·m, Coulomb torque",

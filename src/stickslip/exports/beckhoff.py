@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import axis_unit, name_setting
 from stickslip.exports._points import stiffness, table_form
 from stickslip.exports._text import render
 from stickslip.exports.job import Check, Export, Job
 from stickslip.exports.nearest import Curve, Form, Nearest, carried, curve_of
 from stickslip.exports.target import Setting, Target, settings_of
-from stickslip.messages import axis_unit, name_setting
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 ENTRIES = 20
 UNITS = {"rotary": 180.0 / math.pi * 1000.0, "linear": 1e6}

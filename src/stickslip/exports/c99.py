@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import axis_unit
+from stickslip.core.spec import Field, Surroundings
 from stickslip.exports._analysis import Facts, analyse, merged
 from stickslip.exports._c import HEADERS, Dialect, functions, head, safe
 from stickslip.exports._guard import guarded
@@ -35,8 +37,6 @@ from stickslip.exports.golden import (
 from stickslip.exports.job import Check, Export, Job, counts_in
 from stickslip.exports.nearest import read_by
 from stickslip.exports.target import Target
-from stickslip.messages import axis_unit
-from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
 SINGLE_BOUND = 1e-2

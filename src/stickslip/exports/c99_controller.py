@@ -14,6 +14,7 @@ import numpy as np
 
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.controller import Controller
+from stickslip.core.spec import Surroundings, fields_of
 from stickslip.exports._analysis import Facts, analyse
 from stickslip.exports._c import Dialect, functions, head
 from stickslip.exports._step_error import PARTS, about_steps
@@ -43,7 +44,6 @@ from stickslip.exports.controllers import (
 )
 from stickslip.exports.golden import Samples, as_csv
 from stickslip.exports.job import Check, Export
-from stickslip.spec import Surroundings, fields_of
 
 PUBLIC = ("_sample", "_sample_turns", "_follow", "_follow_turns")
 NARROW = "float turns, float position, float reference_turns, float reference, "

@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import axis_unit, name_option
+from stickslip.core.spec import Surroundings
 from stickslip.exports._analysis import merged
 from stickslip.exports.golden import Samples, changing, random_motion, sampled_torques
 from stickslip.exports.job import IDENTIFIER, Check, Export
 from stickslip.exports.nearest import read_by
-from stickslip.messages import axis_unit, name_option
-from stickslip.spec import Surroundings
 from stickslip.subset import named
 
 STILL = Surroundings()

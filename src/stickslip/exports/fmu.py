@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.core.spec import Surroundings
 from stickslip.exports._fmu import Variable, contents_of, law_variables, numbered, surroundings_read, units_of
 from stickslip.exports._fmu_run import checked
 from stickslip.exports._step_error import about_steps
@@ -18,7 +19,6 @@ from stickslip.exports._text import render
 from stickslip.exports.golden import csv_of, random_steps
 from stickslip.exports.job import Check, Export, Job
 from stickslip.exports.target import Target
-from stickslip.spec import Surroundings
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 HEAD = "time_s,dt_s,velocity_rad_s,acceleration_rad_s2,position_rad,torque_Nm"

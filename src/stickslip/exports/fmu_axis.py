@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.core.messages import axis_unit
 from stickslip.exports._analysis import analyse, fields_read
 from stickslip.exports._c import Dialect, functions
 from stickslip.exports._fmu import Variable, contents_of, law_variables, numbered, surroundings_read, units_of
@@ -24,8 +25,7 @@ from stickslip.exports._text import render, summary
 from stickslip.exports.golden import csv_of
 from stickslip.exports.job import Check, Export, Job
 from stickslip.exports.target import Setting, Target, settings_of
-from stickslip.friction_levels import static_level
-from stickslip.messages import axis_unit
+from stickslip.models.friction_levels import static_level
 from stickslip.subset import named
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from stickslip.control.controller import Controller
+from stickslip.core.spec import Surroundings
 from stickslip.exports import c99, c99_controller
 from stickslip.exports._analysis import fields_read
 from stickslip.exports._fmu import (
@@ -37,7 +38,6 @@ from stickslip.exports.controllers import (
 )
 from stickslip.exports.golden import Samples, as_csv, sampled_torques
 from stickslip.exports.job import Check, Export
-from stickslip.spec import Surroundings
 
 GIVEN: tuple[str, ...] = ("position", "reference", "reference_velocity", "reference_acceleration")
 MEANING = ("Measured position", "Reference position", "Reference velocity", "Reference acceleration")

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.control.plain import plain_sample
+from stickslip.core.spec import Surroundings
 from stickslip.exports.nearest import surroundings_of
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TRIED, ROUNDED, NEAR = 24, 1e-6, 0.1

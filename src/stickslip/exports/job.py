@@ -7,10 +7,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option, rendered
 from stickslip.exports._text import folded
-from stickslip.messages import name_option, rendered
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")
 

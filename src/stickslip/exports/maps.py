@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import name_option, name_setting
 from stickslip.exports.job import IDENTIFIER, Export
 from stickslip.exports.position_tables import c_table, moteus, odrive, vesc
 from stickslip.exports.position_waves import linuxcnc_waves, st_function, twincat_pou
 from stickslip.machines.position_map import PositionMap
-from stickslip.messages import name_option, name_setting
 
 CONSTANT = "torque_constant"
 

@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from stickslip.core.messages import axis_unit
+from stickslip.core.spec import Field, Surroundings
 from stickslip.exports._guard import guarded
 from stickslip.exports._matlab import functions, local, safe, with_helpers
 from stickslip.exports._step_error import about_steps
@@ -15,8 +17,6 @@ from stickslip.exports._text import render, summary, text_in
 from stickslip.exports.golden import PACE, as_csv, golden_around
 from stickslip.exports.job import Check, Export, Job, counts_in
 from stickslip.exports.target import Target
-from stickslip.messages import axis_unit
-from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
 BOUND = 1e-12

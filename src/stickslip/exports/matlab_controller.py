@@ -8,6 +8,7 @@ from typing import Any
 
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.controller import Controller
+from stickslip.core.spec import Field, Surroundings, fields_of
 from stickslip.exports._matlab import functions, local, safe, with_helpers
 from stickslip.exports._text import first_line, render, summary
 from stickslip.exports.controllers import (
@@ -22,7 +23,6 @@ from stickslip.exports.controllers import (
 from stickslip.exports.golden import Samples
 from stickslip.exports.job import Export
 from stickslip.exports.matlab import BOUND, comment, in_octave, meaning_of
-from stickslip.spec import Field, Surroundings, fields_of
 
 PUBLIC = ("sample", "follow")
 

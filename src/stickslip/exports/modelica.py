@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import axis_unit
+from stickslip.core.spec import Field, Surroundings
 from stickslip.exports._analysis import merged
 from stickslip.exports._guard import guarded
 from stickslip.exports._modelica import KEYWORDS, functions, safe
@@ -25,8 +27,6 @@ from stickslip.exports._text import Code, in_lines, render, sources, text_in
 from stickslip.exports.golden import PACE, as_csv, golden_around
 from stickslip.exports.job import Check, Export, Job, counts_in
 from stickslip.exports.target import Target
-from stickslip.messages import axis_unit
-from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -15,8 +15,10 @@ import math
 from typing import Any
 from xml.etree import ElementTree
 
-from stickslip.binding import NEGATIVE
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import axis_unit, name_setting
+from stickslip.core.rebinding import NEGATIVE
+from stickslip.core.spec import Surroundings
 from stickslip.exports._mujoco_read import Part, joint_named, parts
 from stickslip.exports._mujoco_run import drift, pulled, spring
 from stickslip.exports._text import render
@@ -33,9 +35,7 @@ from stickslip.exports.nearest import (
     with_constant,
 )
 from stickslip.exports.target import Setting, Target, settings_of
-from stickslip.messages import axis_unit, name_setting
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.models.model import Model
 
 MOTOR = ("sigma0", "sigma1", "fc", "fs", "vs")
 """Of LuGre, in the order of the attribute ``lugre``."""

@@ -16,16 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from stickslip import plugins
-from stickslip.binding import NEGATIVE
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
+from stickslip.core.messages import axis_unit, name_option
+from stickslip.core.rebinding import NEGATIVE
+from stickslip.core.spec import Bristle, Law, Mode
 from stickslip.exports._analysis import fields_read
 from stickslip.exports._sliding import Curve
 from stickslip.exports._text import folded
 from stickslip.exports.job import CannotCarry, Job
-from stickslip.messages import axis_unit, name_option
-from stickslip.model import Model
-from stickslip.spec import Bristle, Law, Mode
+from stickslip.models import plugins
+from stickslip.models.model import Model
 from stickslip.subset import law_layouts, named
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.exports._text import text_in
 from stickslip.exports.job import Export
 from stickslip.machines.position_map import PositionMap

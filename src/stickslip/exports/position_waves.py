@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
 from stickslip.exports._text import text_in
 from stickslip.exports.job import Export
 from stickslip.exports.position_tables import left_of, whole_turn
 from stickslip.machines.position_map import PositionMap
-from stickslip.messages import name_option
 
 
 def st_function(found: PositionMap, name: str = "cogging") -> Export:

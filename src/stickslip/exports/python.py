@@ -12,14 +12,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from stickslip.core.messages import axis_unit
+from stickslip.core.spec import Field, Surroundings
 from stickslip.exports._guard import guarded
 from stickslip.exports._step_error import about_steps
 from stickslip.exports._text import Code, in_units_of_axis, render, sources
 from stickslip.exports.golden import PACE, as_csv, golden_around
 from stickslip.exports.job import Check, Export, Job, counts_in
 from stickslip.exports.target import Target
-from stickslip.messages import axis_unit
-from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
 SUBSTEPS = "`contact.step(v0, v1, dt, substeps=4)` divides a step, the velocity linear in between."

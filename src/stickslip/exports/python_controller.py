@@ -6,6 +6,7 @@ import ast
 
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.controller import Controller
+from stickslip.core.spec import Surroundings, fields_of
 from stickslip.exports._text import Code, render
 from stickslip.exports.controllers import (
     STILL,
@@ -19,7 +20,6 @@ from stickslip.exports.controllers import (
 from stickslip.exports.golden import as_csv
 from stickslip.exports.job import Check, Export
 from stickslip.exports.python import alone, assigned, cleared, constant, count_by_constant, indent_docstring
-from stickslip.spec import Surroundings, fields_of
 
 PUBLIC = ("sample", "sample_turns", "follow", "follow_turns")
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from stickslip.core.messages import axis_unit
+from stickslip.core.spec import Field, Surroundings
 from stickslip.exports._guard import guarded
 from stickslip.exports._hoist import hoisted
 from stickslip.exports._st import Names, functions, number
@@ -14,8 +16,6 @@ from stickslip.exports._text import Code, in_lines, render, sources, summary, te
 from stickslip.exports.golden import PACE, as_csv, golden_around
 from stickslip.exports.job import Export, Job, counts_in
 from stickslip.exports.target import Target
-from stickslip.messages import axis_unit
-from stickslip.spec import Field, Surroundings
 from stickslip.subset import law_layouts, named
 
 BLOCK = (

@@ -7,6 +7,7 @@ from typing import Any
 
 from stickslip.control.composition import MEMORY, Settings
 from stickslip.control.controller import Controller
+from stickslip.core.spec import Field, Surroundings, fields_of
 from stickslip.exports._hoist import hoisted
 from stickslip.exports._st import Names, functions, number
 from stickslip.exports._st_names import RESERVED, named_in_st, renamed
@@ -25,7 +26,6 @@ from stickslip.exports.golden import as_csv
 from stickslip.exports.job import Export
 from stickslip.exports.st import NOTE, about, cleared, declared
 from stickslip.exports.st import STRUCTURES as OF_LAWS
-from stickslip.spec import Field, Surroundings, fields_of
 
 GIVEN = ("position", "reference_position", "reference_velocity", "reference_acceleration")
 BLOCK = (

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import axis_unit
 from stickslip.exports._points import table_form
 from stickslip.exports._text import render
 from stickslip.exports.job import Check, Export, Job
 from stickslip.exports.nearest import Curve, Nearest, carried
 from stickslip.exports.target import Setting, Target, settings_of
-from stickslip.messages import axis_unit
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 if TYPE_CHECKING:
     from stickslip.identification.steady_friction.points import SlidingPoints

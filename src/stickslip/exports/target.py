@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import name_option, name_setting
 from stickslip.exports.job import Check, Export, Job
 from stickslip.exports.nearest import Form
-from stickslip.messages import name_option, name_setting
 
 ANY_LAW = "any law, as it is"
 

@@ -12,12 +12,12 @@ import importlib.util
 from typing import Any
 from xml.etree import ElementTree
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.exports._text import render
 from stickslip.exports.job import Check, Export, Job
 from stickslip.exports.nearest import COULOMB, carried
 from stickslip.exports.target import Setting, Target, settings_of
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 NAMES = {"fc": "friction", "sigma2": "damping"}
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 if TYPE_CHECKING:
     from stickslip.report.analysis_pictures import Drawn

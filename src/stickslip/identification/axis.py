@@ -16,8 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from stickslip import plugins
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import Note, name_columns, name_option
+from stickslip.core.spec import Law
+from stickslip.identification.estimate import Estimate, Identification, silent
+from stickslip.identification.experiment import Experiment, insist_on_motion
+from stickslip.identification.fit.axis_start import each_way
+from stickslip.identification.fit.noise import Noise
+from stickslip.identification.fit.parameter_vector import Parameter, Vector
+from stickslip.identification.fit.uncertainty import verdict_on
 from stickslip.identification.laws import (
     Candidate,
     asked_of,
@@ -36,6 +43,21 @@ from stickslip.identification.notes import (
     on_timing,
     reason_for,
 )
+from stickslip.identification.output_error.gravity import hanging, within_a_turn
+from stickslip.identification.output_error.load_check import ADVICE, judged_load
+from stickslip.identification.output_error.loop_check import doubted_loops
+from stickslip.identification.output_error.output import OutputError, judged
+from stickslip.identification.output_error.problem import Problem, mechanics_parameters
+from stickslip.identification.output_error.search import (
+    Asked,
+    Extras,
+    FittedAxis,
+    errors_of,
+    fitted_axis,
+    require_start,
+)
+from stickslip.identification.regression.force_error import force_error, force_error_on, plain_error_on
+from stickslip.identification.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
 from stickslip.identification.search import Asked as SlidingAsked
 from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
 from stickslip.identification.slow_motion import (
@@ -46,24 +68,9 @@ from stickslip.identification.slow_motion import (
     means_the_same,
     moments,
 )
-from stickslip.identification.output_error.gravity import hanging, within_a_turn
-from stickslip.identification.output_error.load_check import ADVICE, judged_load
-from stickslip.identification.output_error.loop_check import doubted_loops
-from stickslip.identification.output_error.output import OutputError, judged
-from stickslip.identification.output_error.problem import Problem, mechanics_parameters
-from stickslip.identification.output_error.search import Asked, Extras, FittedAxis, errors_of, fitted_axis, require_start
-from stickslip.identification.estimate import Estimate, Identification, silent
-from stickslip.identification.experiment import Experiment, insist_on_motion
-from stickslip.identification.fit.axis_start import each_way
-from stickslip.identification.fit.noise import Noise
-from stickslip.identification.fit.parameter_vector import Parameter, Vector
-from stickslip.identification.fit.uncertainty import verdict_on
-from stickslip.identification.regression.force_error import force_error, force_error_on, plain_error_on
-from stickslip.identification.regression.inverse import InverseDynamics, inverse_dynamics, refuse_harmonics
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import Note, name_columns, name_option
-from stickslip.model import Model
-from stickslip.spec import Law
+from stickslip.models import plugins
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import UnknownName
+from stickslip.core.errors import UnknownName
+from stickslip.core.messages import render, rendered
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import render, rendered
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import axis_unit
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.fit.parameter_vector import Vector
-from stickslip.messages import axis_unit
 from stickslip.simulation.prescribed.steady import Steady
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

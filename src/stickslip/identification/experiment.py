@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_columns, name_loop
+from stickslip.core.record import Record
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_columns, name_loop
-from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

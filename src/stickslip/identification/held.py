@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from stickslip.binding import NEGATIVE
-from stickslip.identification.output_error.problem import mechanics_parameters
+from stickslip.core.rebinding import NEGATIVE
 from stickslip.identification.estimate import Held, Identification
+from stickslip.identification.output_error.problem import mechanics_parameters
 from stickslip.machines.servo import ServoAxis
 
 

@@ -11,14 +11,14 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.config import Table, read_toml
-from stickslip.errors import InputError
+from stickslip.core.config import Table, read_toml
+from stickslip.core.errors import InputError
+from stickslip.core.messages import in_linear_units, name_file
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.motion import Motion, motion_in
 from stickslip.machines.identified import train_in
 from stickslip.machines.two_inertias import TwoInertias
-from stickslip.messages import in_linear_units, name_file
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.identification.slow_motion import Evidence, held_elsewhere, search_law, start_beside
-from stickslip.identification.output_error.search import Asked, errors_of, fitted_axis
-from stickslip.identification.output_error.starts import motion_of, watched
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Law
 from stickslip.identification.estimate import silent
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.fit.axis_start import feasible
@@ -20,10 +18,12 @@ from stickslip.identification.fit.parallel import mapped
 from stickslip.identification.fit.parameter_vector import Vector
 from stickslip.identification.observer.innovations import BAND, DELAY, FIRST, Criterion, robust_std
 from stickslip.identification.observer.observer import Motion, Prepared, prepare
+from stickslip.identification.output_error.search import Asked, errors_of, fitted_axis
+from stickslip.identification.output_error.starts import motion_of, watched
 from stickslip.identification.regression.inverse import InverseDynamics
+from stickslip.identification.slow_motion import Evidence, held_elsewhere, search_law, start_beside
 from stickslip.machines.servo import ServoAxis
-from stickslip.model import Model
-from stickslip.spec import Law
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 
+from stickslip.identification.experiment import Experiment
 from stickslip.identification.search import Asked
 from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
-from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 
 EstimateSliding = Callable[..., SlidingPosterior]

@@ -1,6 +1,6 @@
 """model.toml: an identified law with its axis, intervals, correlation, and where it comes from.
 
-`stickslip.model.Model.from_file` reads the law back; a study or simulation names it by
+`stickslip.models.model.Model.from_file` reads the law back; a study or simulation names it by
 ``law = {model = "model.toml"}``. Numbers are in SI units; those of a linear axis in N and m.
 """
 
@@ -17,17 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.config import Document, Table
-from stickslip.errors import InputError
+from stickslip.core.config import Document, Table
+from stickslip.core.errors import InputError
+from stickslip.core.whole_files import write_whole
+from stickslip.identification.estimate import Estimate, Identification
 from stickslip.identification.sliding import SlidingPosterior
 from stickslip.identification.train import two_inertias
-from stickslip.identification.estimate import Estimate, Identification
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
 from stickslip.machines.two_inertias import TwoInertias
-from stickslip.model import MODEL_FORMAT, Model
-from stickslip.whole_files import write_whole
+from stickslip.models.model import MODEL_FORMAT, Model
 
 
 def write_model(

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.identification.estimate import Estimate
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.prescribed.steady import Steady
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.messages import name_file, name_option
-from stickslip.record import Record
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_file, name_option
+from stickslip.core.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

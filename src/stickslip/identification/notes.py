@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from stickslip.core.messages import Note, name_option
 from stickslip.identification.sliding import PRESENT, SlidingPosterior
-from stickslip.messages import Note, name_option
 
 KNOWN_DELAY = 0.25
 """Rows: half-width of a delay up to which it is worth a sentence."""

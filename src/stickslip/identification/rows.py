@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.identification.experiment import Experiment
 from stickslip.identification.strokes import (
     SlidingRecord,
     TooLittleSliding,
@@ -17,7 +18,6 @@ from stickslip.identification.strokes import (
     sliding_record,
 )
 from stickslip.identification.windows import apply_at, window_weights
-from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

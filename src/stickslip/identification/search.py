@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
 from stickslip.identification.alternatives import usual_alternatives
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.alternatives.cogging import (

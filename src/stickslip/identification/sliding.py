@@ -14,18 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.binding import NEGATIVE
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
+from stickslip.core.rebinding import NEGATIVE
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.alternatives.disturbance import DISTURBANCE
+from stickslip.identification.experiment import Experiment, insist_on_motion
+from stickslip.identification.fit.student import student_quantile
 from stickslip.identification.mixture import NEGLIGIBLE, Member, Mixture, mix
 from stickslip.identification.posterior import EXPONENT_ODDS, EXPONENTS
 from stickslip.identification.rows import LATEST, SlidingRows, sample_rows, sliding_rows
 from stickslip.identification.search import Asked, Fit, Start, settle
-from stickslip.identification.experiment import Experiment, insist_on_motion
-from stickslip.identification.fit.student import student_quantile
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_option
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

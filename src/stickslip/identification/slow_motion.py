@@ -22,14 +22,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.binding import NEGATIVE
-from stickslip.errors import InputError
-from stickslip.identification.posterior import log_sum
-from stickslip.identification.sliding import QUANTILE, SlidingPosterior, quantiles
-from stickslip.identification.output_error.gravity import hanging
-from stickslip.identification.output_error.problem import mechanics_of
-from stickslip.identification.output_error.search import Asked, laid_out
-from stickslip.identification.output_error.starts import Watched, starting_points, watched
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_parameter
+from stickslip.core.rebinding import NEGATIVE
+from stickslip.core.spec import Law, Par
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.fit.axis_start import feasible
@@ -55,12 +51,16 @@ from stickslip.identification.observer.innovations import (
     weighted,
 )
 from stickslip.identification.observer.observer import EXACT, ROUGH, prepare
+from stickslip.identification.output_error.gravity import hanging
+from stickslip.identification.output_error.problem import mechanics_of
+from stickslip.identification.output_error.search import Asked, laid_out
+from stickslip.identification.output_error.starts import Watched, starting_points, watched
+from stickslip.identification.posterior import log_sum
 from stickslip.identification.regression.inverse import InverseDynamics
+from stickslip.identification.sliding import QUANTILE, SlidingPosterior, quantiles
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_parameter
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.prescribed.steady import Steady
-from stickslip.spec import Law, Par
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

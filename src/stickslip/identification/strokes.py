@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.identification.windows import LEAST_SAMPLES, apply_at, unblurred_weights, window_weights
+from stickslip.core.errors import InputError
+from stickslip.core.record import encoder_step
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.regression.inverse import uniform, white_noise
+from stickslip.identification.windows import LEAST_SAMPLES, apply_at, unblurred_weights, window_weights
 from stickslip.machines.servo import ServoAxis
-from stickslip.record import encoder_step
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.int64]]

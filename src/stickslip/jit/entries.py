@@ -17,10 +17,10 @@ import numpy as np
 from numba import types
 from numba.core.ccallback import CFunc
 
+from stickslip.core.spec import Law
 from stickslip.jit.addresses import SIGNATURES, pointer_at
 from stickslip.jit.inner import InnerCompiler
 from stickslip.jit.kept import cached, decorating, loaded
-from stickslip.spec import Law
 from stickslip.subset import Layout, law_layouts, lower
 
 NO_ADDRESS: dict[str, Any] = {"no_cfunc_wrapper": True}

@@ -26,9 +26,9 @@ from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.runtime.nrt import rtsys
 
-from stickslip import compiling
-from stickslip.errors import UnusedPlace
-from stickslip.ownership import exposure_of
+from stickslip.core import compile_notice
+from stickslip.core.errors import UnusedPlace
+from stickslip.core.ownership import exposure_of
 
 ROOMS = ("jit", "simulation", "machines", "rigs")
 """Rooms of the package that have kernels: what these are made of, with the constants that they hold."""
@@ -81,10 +81,12 @@ class _Told(event.Listener):
     def on_start(self, event: Any) -> None:
         # Kernels of the package are what warm-up compiles; the translated texts of laws are made in `entries`.
         module = str(event.data["dispatcher"].py_func.__module__)
-        compiling.started(compiling.OWN_WORDS if module.startswith(TRANSLATED) else compiling.WORDS)
+        compile_notice.started(
+            compile_notice.OWN_WORDS if module.startswith(TRANSLATED) else compile_notice.WORDS
+        )
 
     def on_end(self, event: Any) -> None:
-        compiling.ended()
+        compile_notice.ended()
 
 
 event.register("numba:compile", _Told())

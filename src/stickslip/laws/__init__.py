@@ -1,4 +1,4 @@
-"""What friction is: one file a law. `LAWS` names them; `stickslip.plugins.law` looks them up.
+"""What friction is: one file a law. `LAWS` names them; `stickslip.models.plugins.law` looks them up.
 
 To add a law, write its file and add its name to this tuple.
 """

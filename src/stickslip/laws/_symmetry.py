@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from stickslip.binding import NEGATIVE, negative
-from stickslip.spec import Choice, Option
+from stickslip.core.rebinding import NEGATIVE, negative
+from stickslip.core.spec import Choice, Option
 
 # What the wrapped law has under these names, bound when the option is chosen.
 inner_step: Any = None

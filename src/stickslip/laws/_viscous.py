@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.spec import Choice, Option, Par
+from stickslip.core.spec import Choice, Option, Par
 
 
 class Linear(NamedTuple):

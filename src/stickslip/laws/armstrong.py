@@ -15,10 +15,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.core.spec import Law, Memory, Mode, Par
 from stickslip.laws._direction import direction_of
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
-from stickslip.spec import Law, Memory, Mode, Par
 
 
 class Params(NamedTuple):

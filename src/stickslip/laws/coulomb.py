@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.core.spec import Elements, Law, Par
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
-from stickslip.spec import Elements, Law, Par
 
 
 class Params(NamedTuple):

@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.core.spec import Bristle, Law, Mode, Par
 from stickslip.laws._direction import direction_ends, direction_of
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
-from stickslip.spec import Bristle, Law, Mode, Par
 
 CLOSE = 1e-12
 """Of F_C, from the level on which a brittle contact's force rises evenly through it: the level, which it meets as a

@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.core.spec import Bristle, Law, Par
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.laws.sliding_curve import CURVE, extremes
 from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
-from stickslip.spec import Bristle, Law, Par
 
 SUBSTEP = 0.05
 """Length of a substep between z_ba and z_ss over the length on which the bristle's rate changes."""

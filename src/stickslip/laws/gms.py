@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.core.spec import Elements, Law, Mode, Par
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.laws.sliding_curve import CURVE, extremes
@@ -17,7 +18,6 @@ from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
 from stickslip.laws.slip_rule import SLIP_RULE, switch
 from stickslip.laws.slip_rule import signed as load_of
-from stickslip.spec import Elements, Law, Mode, Par
 
 
 class Params(NamedTuple):

@@ -15,13 +15,13 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.core.spec import Law, Mode, Par
 from stickslip.laws._direction import direction_ends, direction_of
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.laws.sliding_curve import CURVE, extremes
 from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
-from stickslip.spec import Law, Mode, Par
 
 GAMMA = 1.0 - math.sqrt(0.5)
 """Alexander's coefficient (1977): two stages of backward Euler, of second order and stable for any step."""

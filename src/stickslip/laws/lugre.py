@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.core.spec import Bristle, Choice, Law, Option, Par
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.laws.sliding_curve import CURVE, GRID, extremes
 from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
-from stickslip.spec import Bristle, Choice, Law, Option, Par
 
 
 class Params(NamedTuple):

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.core.spec import Law, Par
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
-from stickslip.spec import Law, Par
 
 
 class Params(NamedTuple):

@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.core.spec import Elements, Law, Mode, Par
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.laws.slip_rule import switch
-from stickslip.spec import Elements, Law, Mode, Par
 
 
 class Params(NamedTuple):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.spec import Choice, Option, Par
+from stickslip.core.spec import Choice, Option, Par
 
 
 class Spectrum(NamedTuple):

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.spec import Choice, Option, Par
+from stickslip.core.spec import Choice, Option, Par
 
 GRID = (0.0, *(10.0 ** (0.02 * i) for i in range(-200, 251)))
 """Multiples of the velocity scale at which a curve is looked at as a whole."""

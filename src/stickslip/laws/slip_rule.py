@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from stickslip.spec import Choice, Option
+from stickslip.core.spec import Choice, Option
 
 
 def signed(direction: float, force: float) -> float:

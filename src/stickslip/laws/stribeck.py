@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.core.spec import Elements, Law, Par
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.laws.sliding_curve import CURVE
 from stickslip.laws.sliding_curve import stribeck as sliding
 from stickslip.laws.sliding_curve import stribeck_scale as sliding_scale
-from stickslip.spec import Elements, Law, Par
 
 
 class Params(NamedTuple):

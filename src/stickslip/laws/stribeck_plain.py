@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from stickslip.core.spec import Law
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
 from stickslip.laws.sliding_curve import CURVE
 from stickslip.laws.sliding_curve import stribeck as sliding
-from stickslip.spec import Law
 
 
 class Params(NamedTuple):

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from stickslip.core.spec import Law
 from stickslip.laws._viscous import VISCOUS
 from stickslip.laws._viscous import linear as viscous
-from stickslip.spec import Law
 
 
 class Params(NamedTuple):

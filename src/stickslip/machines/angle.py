@@ -8,9 +8,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.machines.motor import Harmonics
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 NONE = Harmonics()

@@ -11,12 +11,12 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Any, cast
 
-from stickslip.arguments import constructor_named, insist_on_own
-from stickslip.description import Par
-from stickslip.errors import ParameterError
+from stickslip.core.arguments import constructor_named, insist_on_own
+from stickslip.core.description import Par
+from stickslip.core.errors import ParameterError
 from stickslip.machines.described import described
 from stickslip.machines.motor import Harmonics
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 LEVELS = ("fs", "fc", "alpha0", "beta0", "curve_torque")
 """Parameters that lift a whole sliding curve: of the Stribeck curve, of thesis eqs. 4.4 and 4.5, of a table."""

@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
-from stickslip.description import Par
+from stickslip.core.description import Par
 
 T = TypeVar("T")
 HEAD = "\n\nAttributes\n----------\n"

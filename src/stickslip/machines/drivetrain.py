@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]

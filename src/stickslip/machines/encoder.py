@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from stickslip.arguments import constructor_named, insist_on_own
-from stickslip.description import Par
-from stickslip.errors import ParameterError
+from stickslip.core.arguments import constructor_named, insist_on_own
+from stickslip.core.description import Par
+from stickslip.core.errors import ParameterError
 from stickslip.machines.described import described
 
 

@@ -13,10 +13,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from stickslip import plugins
-from stickslip.arguments import arguments_checked
-from stickslip.config import Table, read_toml
-from stickslip.errors import ModelRemark, UnknownName
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.config import Table, read_toml
+from stickslip.core.errors import ModelRemark, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.encoder import Encoder
 from stickslip.machines.flexible import FlexibleAxis
@@ -25,8 +24,9 @@ from stickslip.machines.keys import BY_NAME
 from stickslip.machines.machine import Machine, Sensor
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
 from stickslip.machines.two_mass import ENCODERS, TwoMassAxis
-from stickslip.model import Model
-from stickslip.model_tables import model
+from stickslip.models import plugins
+from stickslip.models.model import Model
+from stickslip.models.tables import model
 
 LIBRARY = Path(__file__).parent / "library"
 """Where the package's own machines lie."""

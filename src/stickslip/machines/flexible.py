@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-from stickslip.arguments import constructor_named, insist_on_own
-from stickslip.description import Par
+from stickslip.core.arguments import constructor_named, insist_on_own
+from stickslip.core.description import Par
 from stickslip.machines.described import described
 from stickslip.machines.train import Train, refuse_damping, refuse_part
 

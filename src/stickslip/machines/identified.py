@@ -9,14 +9,14 @@ import math
 from collections.abc import Mapping
 from typing import Any, cast
 
-from stickslip.config import Table
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.config import Table
+from stickslip.core.errors import InputError, ParameterError
+from stickslip.core.messages import name_file
 from stickslip.machines.contact import Contact
 from stickslip.machines.machine import Machine
 from stickslip.machines.motor import Harmonics
 from stickslip.machines.two_inertias import TwoInertias
-from stickslip.messages import name_file
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 NOTE = "As identified from {records}; amplifier and encoder are ideal, a constant torque is not in it."
 BEHIND = "Its spring is damped by {damping:g} of critical, which the record does not tell; friction is at the load."

@@ -11,9 +11,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass
 from typing import Any, NamedTuple, cast
 
-from stickslip.config import Table
-from stickslip.description import Par
-from stickslip.errors import ConfigError
+from stickslip.core.config import Table
+from stickslip.core.description import Par
+from stickslip.core.errors import ConfigError
 from stickslip.machines.contact import Bearings, Drift, Heat
 from stickslip.machines.described import default_of, numbers_of
 from stickslip.machines.encoder import Encoder

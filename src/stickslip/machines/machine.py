@@ -15,9 +15,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, cast
 
-from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
-from stickslip.description import Par
-from stickslip.errors import ModelRemark, ParameterError, UnknownName
+from stickslip.core.arguments import arguments_checked, constructor_named, insist_on_own
+from stickslip.core.description import Par
+from stickslip.core.errors import ModelRemark, ParameterError, UnknownName
 from stickslip.machines.contact import Bearings, Contact, Drift, Heat
 from stickslip.machines.described import described
 from stickslip.machines.drivetrain import FREE, Drivetrain, LinearContact
@@ -25,7 +25,7 @@ from stickslip.machines.encoder import Encoder
 from stickslip.machines.flexible import FlexibleAxis
 from stickslip.machines.motor import Amplifier, Converter, Harmonics
 from stickslip.machines.two_mass import TwoMassAxis
-from stickslip.model import Model, level_of_caller
+from stickslip.models.model import Model, level_of_caller
 
 UNITY, NONE, EXACT, EXACTLY = Amplifier(1.0), Harmonics(), Encoder(), Converter()
 

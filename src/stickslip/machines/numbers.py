@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from stickslip.errors import UnknownName
+from stickslip.core.errors import UnknownName
 from stickslip.machines.machine import Machine
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 FIXED = ("sample_time", "spring_factor")
 """Numbers that are not the machine's to vary: its controller is made for them."""

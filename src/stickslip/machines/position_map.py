@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.errors import InputError, ParameterError
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from stickslip.arguments import constructor_named, insist_on_own
-from stickslip.errors import ParameterError
-from stickslip.model import Model
-from stickslip.values import making, standard_of
+from stickslip.core.arguments import constructor_named, insist_on_own
+from stickslip.core.errors import ParameterError
+from stickslip.core.reprs import making, standard_of
+from stickslip.models.model import Model
 
 ABSOLUTE_ZERO = -273.15
 """°C"""

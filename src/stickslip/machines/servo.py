@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from stickslip.arguments import no_number
-from stickslip.errors import ParameterError
-from stickslip.messages import in_linear_units, name_option
-from stickslip.rules import is_number
+from stickslip.core.arguments import no_number
+from stickslip.core.errors import ParameterError
+from stickslip.core.messages import in_linear_units, name_option
+from stickslip.core.type_rules import is_number
 
 SIDES = ("motor", "load")
 GRAVITIES = ("constant", "pendulum")

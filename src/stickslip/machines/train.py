@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from typing import Self
 
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.drivetrain import Chain
 
 

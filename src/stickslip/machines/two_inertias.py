@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from stickslip.errors import ParameterError
+from stickslip.core.errors import ParameterError
 from stickslip.machines.two_mass import TwoMassAxis
 
 USUAL_DAMPING = 0.03

@@ -8,7 +8,8 @@ from dataclasses import MISSING
 from pathlib import Path
 from typing import Any
 
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.errors import InputError, ParameterError
+from stickslip.core.whole_files import write_whole
 from stickslip.machines.contact import Contact
 from stickslip.machines.described import numbers_of
 from stickslip.machines.encoder import Encoder
@@ -16,8 +17,7 @@ from stickslip.machines.keys import PARTS, Part
 from stickslip.machines.machine import Machine, Sensor
 from stickslip.machines.motor import Amplifier
 from stickslip.machines.two_mass import TwoMassAxis
-from stickslip.model_tables import written
-from stickslip.whole_files import write_whole
+from stickslip.models.tables import written
 
 ALWAYS = ("sample_time",)
 """Written even where they are as usual."""

@@ -6,9 +6,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from stickslip.errors import InputError, suggestion
-from stickslip.finding import Finding
-from stickslip.messages import name_columns, name_option
+from stickslip.core.errors import InputError, suggestion
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns, name_option
 from stickslip.readers._joints import MAIN, Joints, listed_names, with_rates
 from stickslip.readers._names import ALIASES, KINDS, ROLES, Name, motor_force, role_of, words
 from stickslip.readers._units import in_its_case, may_be_unit, parse_unit, spellings

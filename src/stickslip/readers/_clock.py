@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
-from stickslip.messages import name_columns, name_option
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns, name_option
 from stickslip.readers._choose import Choice
 from stickslip.readers._column_groups import epoch_unit
 from stickslip.readers._stated_period import stated_period

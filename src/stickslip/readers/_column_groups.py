@@ -18,9 +18,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
-from stickslip.messages import name_columns, name_option
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns, name_option
 from stickslip.readers._cells import cell, moment
 from stickslip.readers._names import role_of, words
 from stickslip.readers._units import may_be_unit, parse_unit

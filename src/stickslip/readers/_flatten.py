@@ -9,8 +9,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
 from stickslip.readers._cells import moment
 from stickslip.readers.limits import MAX_COLUMNS, insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Column, Table

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from stickslip.capacity import limit_memory
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.resources import limit_memory
 from stickslip.readers.limits import memory_for, size_of, too_large
 
 T = TypeVar("T")

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.finding import Finding
-from stickslip.messages import name_columns
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns
 from stickslip.readers._names import Name
 from stickslip.readers.table_columns import Array, Column
 

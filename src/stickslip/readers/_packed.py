@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
 from stickslip.readers.table_columns import Array, Column
 
 DEPTH = 8

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, field
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
 
 SIGNS = (".", ",")
 NUMBER = re.compile(r"[-+]?[\d.,]*\d[\d.,]*(?:[eE][-+]?\d+)?")

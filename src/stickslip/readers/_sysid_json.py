@@ -13,9 +13,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
-from stickslip.messages import name_columns
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns
 from stickslip.readers.limits import insist_on_values
 from stickslip.readers.table_columns import Array, Column, Table
 

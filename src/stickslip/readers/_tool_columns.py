@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stickslip.finding import Finding
-from stickslip.messages import name_columns, name_option
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns, name_option
 from stickslip.readers.table_columns import Column, Table
 
 

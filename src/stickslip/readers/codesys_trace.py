@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
-from stickslip.messages import name_option
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_option
 from stickslip.readers._cells import cell, decoded
 from stickslip.readers.table_columns import Array, Column, Format, Table
 

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
-from stickslip.messages import name_columns, name_option
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns, name_option
+from stickslip.core.record import Record
 from stickslip.readers._choose import Choice
 from stickslip.readers._clock import (
     NoTimes,
@@ -25,7 +26,6 @@ from stickslip.readers._clock import (
 from stickslip.readers._names import KINDS, commanded, role_of
 from stickslip.readers._units import SI, Unit, parse_unit
 from stickslip.readers.table_columns import Array, Column, Table
-from stickslip.record import Record
 
 __all__ = ["Drive", "convert", "times_of"]
 

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
 from stickslip.readers import _column_groups
 from stickslip.readers._cells import OF_DAY, cell, clocks_whole, decoded, moment, over_midnight
 from stickslip.readers._column_groups import Layout

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
-from stickslip.messages import name_columns, name_option
-from stickslip.record import Record, encoder_step
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns, name_option
+from stickslip.core.record import Record, encoder_step
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

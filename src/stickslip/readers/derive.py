@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError, UnknownName
-from stickslip.messages import name_option
-from stickslip.record import Record
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import name_option
+from stickslip.core.record import Record
 
 METHODS = ("butterworth", "savitzky-golay")
 INTEGRAL = "integral of the velocity, from 0, by trapezoids"

@@ -9,15 +9,15 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.reprs import is_masked, unmasked
+from stickslip.core.type_rules import with_article
 from stickslip.readers._flatten import table_of
 from stickslip.readers._names import ALIASES, KINDS
 from stickslip.readers._tool_columns import with_tool
 from stickslip.readers._units import SI, parse_unit
 from stickslip.readers.convert import LINEAR
 from stickslip.readers.table_columns import Column, Table
-from stickslip.rules import with_article
-from stickslip.values import is_masked, unmasked
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.readers import _sysid_json
 from stickslip.readers._flatten import table_of
 from stickslip.readers.table_columns import Format, Table

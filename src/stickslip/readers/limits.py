@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from stickslip.capacity import free_memory, size_text
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.resources import free_memory, size_text
 
 MAX_COLUMNS = 5_000
 """Most columns of a file: a car's measurement file has a few thousand channels."""

@@ -10,8 +10,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
 from stickslip.readers import _mat_check, hdf5
 from stickslip.readers._flatten import table_of
 from stickslip.readers.limits import insist_on_columns, insist_on_values

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.extras import needed
+from stickslip.core.errors import InputError
+from stickslip.core.extras import needed
 from stickslip.readers import _guard
 from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Column, Format, Table

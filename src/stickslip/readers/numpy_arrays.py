@@ -9,7 +9,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.readers._flatten import table_of
 from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Format, Table

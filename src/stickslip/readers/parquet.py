@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.extras import needed
-from stickslip.finding import Finding
+from stickslip.core.errors import InputError
+from stickslip.core.extras import needed
+from stickslip.core.finding import Finding
 from stickslip.readers.limits import insist_on_columns, insist_on_values
 from stickslip.readers.table_columns import Array, Column, Format, Table
 

@@ -17,14 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.config import Table as Section
-from stickslip.config import read_toml
-from stickslip.errors import unwritable
+from stickslip.core.config import Table as Section
+from stickslip.core.config import read_toml
+from stickslip.core.errors import unwritable
+from stickslip.core.record import Record
+from stickslip.core.whole_files import write_whole
 from stickslip.readers._choose import parse_mapping
 from stickslip.readers.convert import TURNING, Drive
 from stickslip.readers.table_columns import Table
-from stickslip.record import Record
-from stickslip.whole_files import write_whole
 
 PUTS_OUT = {"force_constant": TURNING, **dict.fromkeys(TURNING, ("force_constant",))}
 """Numbers of a linear motor replace those of a rotary one in a profile, and vice versa."""

@@ -13,9 +13,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.capacity import insist_on_memory, size_text
-from stickslip.config import refuse_endless
-from stickslip.errors import InputError
+from stickslip.core.config import refuse_endless
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
+from stickslip.core.resources import insist_on_memory, size_text
 from stickslip.readers import profiles
 from stickslip.readers._choose import Choice, choose, meant, parse_mapping
 from stickslip.readers._names import ROLES
@@ -23,7 +24,6 @@ from stickslip.readers._tool_columns import with_tool
 from stickslip.readers.convert import Drive, convert, times_of
 from stickslip.readers.limits import insist_on_columns, size_of
 from stickslip.readers.table_columns import Format, Table
-from stickslip.record import Record
 
 FORMATS = (
     "record_file",

@@ -6,11 +6,11 @@ import zipfile
 from pathlib import Path
 from typing import cast
 
-from stickslip._stream_file import MAGIC
-from stickslip.errors import InputError
+from stickslip.core._stream_file import MAGIC
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.readers.numpy_arrays import insist_on_arrays
 from stickslip.readers.table_columns import Column, Format, Table
-from stickslip.record import Record
 
 
 def recognise(head: bytes, path: Path) -> bool:

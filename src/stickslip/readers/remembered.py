@@ -15,15 +15,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
-from stickslip.messages import name_option, name_options
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_option, name_options
+from stickslip.core.record import Record
 from stickslip.readers._choose import Choice, choose, meant, parse_mapping
 from stickslip.readers._units import parse_unit
 from stickslip.readers.convert import EFFORT, MOTION, Drive, is_linear, unit_of
 from stickslip.readers.profiles import PUTS_OUT, STATEMENTS, Profile, Statement, sizes
 from stickslip.readers.table_columns import Table
-from stickslip.record import Record
 
 UNITS = {
     "rated_torque": ("N·m", "NM"), "rated_current": ("A", "A"), "torque_constant": ("N·m/A", "NM_PER_A"),

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -13,9 +13,9 @@ from struct import unpack_from
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
-from stickslip.messages import name_columns
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns
 from stickslip.readers._packed import Damaged, Member, columns_of, cut_off, dtype_of, members_of
 from stickslip.readers.limits import insist_on_columns
 from stickslip.readers.table_columns import Column, Format, Table

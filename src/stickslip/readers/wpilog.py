@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
 from stickslip.readers._packed import MAX_ELEMENTS, Damaged, Member, columns_of, cut_off, dtype_of, members_of
 from stickslip.readers.limits import insist_on_columns
 from stickslip.readers.table_columns import Column, Format, Table

@@ -18,17 +18,17 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.binding import NEGATIVE
 from stickslip.control.own_loop import ReferenceVelocity
-from stickslip.errors import ParameterError
-from stickslip.friction_levels import static_level
+from stickslip.core.errors import ParameterError
+from stickslip.core.rebinding import NEGATIVE
 from stickslip.identification.estimate import Estimate, missing_fall
 from stickslip.identification.identified_file import Identified
 from stickslip.identification.monte_carlo import draw_models
 from stickslip.machines.machine import Machine
 from stickslip.machines.two_inertias import TwoInertias
 from stickslip.machines.two_mass import TwoMassAxis
-from stickslip.model import Model
+from stickslip.models.friction_levels import static_level
+from stickslip.models.model import Model
 from stickslip.recommendation.plant import Plant
 
 CURRENT_LOOP = (200.0, 2000.0)

@@ -19,8 +19,8 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.catalogue import CATALOGUE, LOOPS, compensated
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade
-from stickslip.errors import ParameterError
-from stickslip.model import Model
+from stickslip.core.errors import ParameterError
+from stickslip.models.model import Model
 from stickslip.recommendation.candidate_run import AT_REST, Drive, Trial, dangers
 from stickslip.recommendation.candidates import NEAR, Bench, why_lost
 from stickslip.recommendation.long_rest import swing_for_long

@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.arguments import insist_on_own
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
 from stickslip.control.linear import Cascade, Gains, place
 from stickslip.control.own_loop import ReferenceVelocity
-from stickslip.errors import ParameterError
+from stickslip.core.arguments import insist_on_own
+from stickslip.core.errors import ParameterError
+from stickslip.core.messages import render
 from stickslip.identification.motion import HOLD, Motion, sinusoid
 from stickslip.machines.machine import LONGEST_DELAY, Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.messages import render
 from stickslip.recommendation.course import Course, course_of
 from stickslip.recommendation.following import followed, simulated
 from stickslip.recommendation.plant import Plant

@@ -14,11 +14,11 @@ from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import COMPENSATORS
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains, place
-from stickslip.friction_levels import static_level
 from stickslip.identification.fit.parallel import in_turn
 from stickslip.identification.monte_carlo import resisting_torque
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model
+from stickslip.models.friction_levels import static_level
+from stickslip.models.model import Model
 from stickslip.recommendation.candidate_run import Drive, Trial, dangers, rings, run
 from stickslip.recommendation.pushed import AfterPushes, swings_on
 from stickslip.recommendation.ringing import by_counts, hunting, integral_of, swing_at_rest, within_counts

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.config import Table
 from stickslip.control.recommended import Recommended
 from stickslip.control.written import tables_of
-from stickslip.errors import InputError
+from stickslip.core.config import Table
+from stickslip.core.errors import InputError
 from stickslip.identification.estimate import Identification
 from stickslip.identification.identified_file import Identified
 from stickslip.identification.model_file import in_memory, model_content, write_model

@@ -9,6 +9,7 @@ import numpy as np
 
 from stickslip.control.composition import MEMORY
 from stickslip.control.controller import Controller
+from stickslip.core.spec import Surroundings
 from stickslip.jit import call_sample, kernel, pointer, record_at
 from stickslip.machines.rigid import RigidAxis
 from stickslip.recommendation.plant import laid_out
@@ -17,7 +18,6 @@ from stickslip.simulation.compiled_controller import Sampled, compiled
 from stickslip.simulation.machine.layout import stand_at
 from stickslip.simulation.machine.plant import CHANNELS, SHOWN, Laid, plant_of
 from stickslip.simulation.machine.step import measure, sample
-from stickslip.spec import Surroundings
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -13,10 +13,10 @@ from dataclasses import replace
 from stickslip.analyse.controller_loop import linearised
 from stickslip.analyse.presliding_loop import Loop
 from stickslip.control.controller import Controller
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
 from stickslip.identification.identified_file import Identified
 from stickslip.machines.machine import SHORT_DELAY
-from stickslip.messages import name_option
 from stickslip.recommendation.candidate_run import Drive
 from stickslip.recommendation.plant import Plant
 from stickslip.recommendation.sample_time import MIDDLE, WELL_DAMPED

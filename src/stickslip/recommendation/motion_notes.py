@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from stickslip.core.messages import name_option
 from stickslip.identification.identified_file import Identified
 from stickslip.machines.rigid import RigidAxis
-from stickslip.messages import name_option
 from stickslip.recommendation.candidate_run import Drive
 from stickslip.recommendation.candidates import Candidate
 from stickslip.recommendation.course import measured

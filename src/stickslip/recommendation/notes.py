@@ -8,11 +8,11 @@ from dataclasses import replace
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import USUAL_TIME
+from stickslip.core.messages import code_of, name_option
 from stickslip.identification.identified_file import Identified
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.machines.two_inertias import TwoInertias
-from stickslip.messages import code_of, name_option
 from stickslip.recommendation.candidate_run import Drive, Trial, run
 from stickslip.recommendation.candidates import Bench, Candidate, resistance
 from stickslip.recommendation.recommendation import ALLOWANCE, BETTER, Recommendation

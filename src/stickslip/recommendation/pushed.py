@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from stickslip.control.controller import Controller
-from stickslip.friction_levels import static_level
 from stickslip.identification.fit.parallel import in_turn
 from stickslip.machines.rigid import RigidAxis
+from stickslip.models.friction_levels import static_level
 from stickslip.recommendation.candidate_run import BUSY, Drive
 from stickslip.recommendation.following import simulated
 from stickslip.recommendation.swings import back_and_forth, repeats, turns

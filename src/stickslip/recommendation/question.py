@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from stickslip.errors import InputError
-from stickslip.friction_levels import line_beyond
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_file, name_option
 from stickslip.identification.identified_file import Identified
 from stickslip.identification.monte_carlo import with_values
-from stickslip.messages import name_file, name_option
-from stickslip.model import Model
+from stickslip.models.friction_levels import line_beyond
+from stickslip.models.model import Model
 from stickslip.recommendation.candidate_run import Drive
 
 

@@ -13,10 +13,10 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import Note
 from stickslip.identification.identified_file import Identified
-from stickslip.messages import Note
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation.axes import plants_of
 from stickslip.recommendation.beside import Own, belief_of, limit_cycle, tried_beside
 from stickslip.recommendation.candidate_run import Drive, Trial, run

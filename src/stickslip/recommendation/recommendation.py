@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
-from stickslip.messages import render, rendered
-from stickslip.model import Model
+from stickslip.core.messages import render, rendered
+from stickslip.models.model import Model
 from stickslip.recommendation.beside import Beside
 from stickslip.recommendation.candidate_run import Drive, Trial
 from stickslip.recommendation.candidates import NEAR, Candidate

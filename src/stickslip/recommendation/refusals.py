@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from stickslip.analyse.wording import ends
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_file, name_option
 from stickslip.identification.fit.uncertainty import RATIO
 from stickslip.identification.identified_file import Identified
-from stickslip.messages import name_file, name_option
 from stickslip.recommendation.candidate_run import Drive, Trial
 from stickslip.recommendation.candidates import breakaway, resistance
 

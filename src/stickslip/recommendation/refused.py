@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from stickslip.core.messages import code_of, name_option
 from stickslip.identification.identified_file import Identified
 from stickslip.machines.rigid import RigidAxis
-from stickslip.messages import code_of, name_option
 from stickslip.recommendation.candidate_run import AT_REST, IN_MOTION, LARGER, LEFT, ROUGH_MOTION
 from stickslip.recommendation.candidates import AFTER_A_PUSH, WORTH, Bench, Candidate, Setting
 from stickslip.recommendation.long_rest import HUNTS

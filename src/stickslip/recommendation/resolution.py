@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
+from stickslip.core.record import counts_of_step
 from stickslip.identification.identified_file import Identified
 from stickslip.machines.machine import Machine
-from stickslip.messages import name_option
-from stickslip.record import counts_of_step
 
 OWN = f"give {name_option('counts_per_rev')}"
 

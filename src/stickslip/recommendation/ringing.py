@@ -12,8 +12,8 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
+from stickslip.core.messages import name_option
 from stickslip.machines.rigid import RigidAxis
-from stickslip.messages import name_option
 from stickslip.recommendation.candidate_run import Drive, Trial, held_between_counts, rings, run
 from stickslip.recommendation.swings import between_counts
 

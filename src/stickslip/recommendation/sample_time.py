@@ -14,11 +14,11 @@ from stickslip.analyse.controller_loop import linearised
 from stickslip.analyse.presliding_loop import Loop
 from stickslip.control.controller import Controller
 from stickslip.control.own_loop import USUAL_TIME
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import Note, name_option
 from stickslip.identification.identified_file import Identified
 from stickslip.machines.drivetrain import Drivetrain
 from stickslip.machines.machine import Machine
-from stickslip.messages import Note, name_option
 from stickslip.recommendation.candidate_run import Drive
 
 WELL_DAMPED = 2.0

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.friction_levels import static_level
+from stickslip.core.messages import name_option
 from stickslip.identification.identified_file import Identified
 from stickslip.identification.needed_motions import motion_for
 from stickslip.machines.rigid import RigidAxis
 from stickslip.machines.two_mass import TwoMassAxis
-from stickslip.messages import name_option
+from stickslip.models.friction_levels import static_level
 from stickslip.recommendation.plant import Plant
 
 LEVEL = 0.05

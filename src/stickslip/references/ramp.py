@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 
+from stickslip.core.spec import Par, ReferenceKind
 from stickslip.references import BEFORE
-from stickslip.spec import Par, ReferenceKind
 
 
 class Params(NamedTuple):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.spec import Par, ReferenceKind
+from stickslip.core.spec import Par, ReferenceKind
 
 
 class Params(NamedTuple):

@@ -7,8 +7,8 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from stickslip.core.spec import Par, ReferenceKind
 from stickslip.references import BEFORE
-from stickslip.spec import Par, ReferenceKind
 
 
 class Params(NamedTuple):

@@ -62,10 +62,10 @@ def write(result: StudyResult) -> Path:
         from stickslip.report.rig_report import write_rig_report
 
         return write_rig_report(result)
-    from stickslip.errors import unwritable
+    from stickslip.core.errors import unwritable
+    from stickslip.core.whole_files import write_whole
     from stickslip.report._view import StudyView
     from stickslip.report.html import render
-    from stickslip.whole_files import write_whole
 
     view = StudyView(result)
     target = result.folder / "report.html"

@@ -10,9 +10,9 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
+from stickslip.core.record import Record
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
-from stickslip.record import Record
+from stickslip.models.model import Model, Reference
 from stickslip.report._view import StudyView
 from stickslip.report.figures import COMMON, Figure, describe, heading, named
 from stickslip.report.plots import Array, Curve, Panel, draw, envelope, one_prefix

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 from stickslip.studies.result import Run, StudyResult
 from stickslip.thesis.edition import EDITIONS, PLAIN
 

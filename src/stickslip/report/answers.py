@@ -13,18 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identification.notes import CONTRADICTED, TIMING_CONTRADICTED, drift_of, on_timing
-from stickslip.identification.sliding import SlidingPosterior
-from stickslip.identification.output_error.loop_check import OTHER_LOOP
-from stickslip.identification.output_error.problem import mechanics_parameters
+from stickslip.core.messages import code_of, name_option, render, rendered
+from stickslip.core.record import Record
 from stickslip.identification.doctor.change import DRIFTS_BY
 from stickslip.identification.estimate import Estimate, Identification, missing_fall
 from stickslip.identification.monte_carlo import resisting_torque
 from stickslip.identification.motion import speeds_of
+from stickslip.identification.notes import CONTRADICTED, TIMING_CONTRADICTED, drift_of, on_timing
+from stickslip.identification.output_error.loop_check import OTHER_LOOP
+from stickslip.identification.output_error.problem import mechanics_parameters
 from stickslip.identification.regression.inverse import InverseDynamics
+from stickslip.identification.sliding import SlidingPosterior
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import code_of, name_option, render, rendered
-from stickslip.record import Record
 from stickslip.report.next_steps import Step, next_steps
 from stickslip.report.plots import quantity
 from stickslip.report.sliding_torque import WORSE, Sliding, beaten, beside_held_inertia, sliding_of

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identification.output_error.loop_check import position_noise
-from stickslip.identification.output_error.search import FittedAxis
+from stickslip.core.messages import Note, code_of, name_option, render
+from stickslip.core.record import encoder_step
 from stickslip.identification.estimate import Identification
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.fit.noise import white_std
+from stickslip.identification.output_error.loop_check import position_noise
+from stickslip.identification.output_error.search import FittedAxis
 from stickslip.identification.regression.inverse import InverseDynamics
-from stickslip.messages import Note, code_of, name_option, render
-from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identification.output_error.problem import PLACE, measured
-from stickslip.identification.output_error.search import FittedAxis
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Identification, Picture, Trace
 from stickslip.identification.monte_carlo import curve_band, resisting_torque
+from stickslip.identification.output_error.problem import PLACE, measured
+from stickslip.identification.output_error.search import FittedAxis
 from stickslip.identification.regression.inverse import InverseDynamics
-from stickslip.record import Record
 from stickslip.report.axis_evidence import measured_friction, slow_rows
 from stickslip.report.plots import envelope, quantity
 from stickslip.report.sliding_torque import Sliding, over_all_rows, sliding_of

@@ -12,10 +12,10 @@ from typing import Any
 
 from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.learned import told
+from stickslip.core.whole_files import write_whole
 from stickslip.report.page import filled
 from stickslip.studies.bench import BenchResult, BenchRun
 from stickslip.studies.bench_decision import CONDITIONS, LATE, USUAL, Choice, Standing, choices, standings
-from stickslip.whole_files import write_whole
 
 WIDTH, LEFT, ROW, TOP = 760.0, 190.0, 15.0, 46.0
 """Layout of a picture, px: width, space for names, height of a row, space for the title."""

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import stickslip
-from stickslip import plugins
-from stickslip.config import refuse_endless
-from stickslip.errors import InputError
-from stickslip.record import Record
-from stickslip.spec import Law
+from stickslip.core.config import refuse_endless
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
+from stickslip.core.spec import Law
+from stickslip.models import plugins
 from stickslip.studies.plan import Study, load, load_run
 from stickslip.studies.planned_run import PlannedRun
 

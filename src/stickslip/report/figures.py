@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.plugins import reference_kind
-from stickslip.record import Record
+from stickslip.core.record import Record
+from stickslip.models.plugins import reference_kind
 from stickslip.report._view import StudyView
 from stickslip.report.captions import case_caption, case_message, error_of
 from stickslip.report.plots import Curve, Panel, draw, envelope, one_prefix

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from stickslip.analyse.wording import ends
-from stickslip.finding import Finding
-from stickslip.identification.output_error.search import FittedAxis
+from stickslip.core.finding import Finding
+from stickslip.core.messages import code_of
+from stickslip.core.record import Record
+from stickslip.core.whole_files import write_whole
 from stickslip.identification.estimate import Estimate, Held, Identification, Picture
-from stickslip.messages import code_of
-from stickslip.record import Record
+from stickslip.identification.output_error.search import FittedAxis
 from stickslip.report.answers import answers_of, meaning_of, one_number_each, speeds_in
 from stickslip.report.axis_evidence import GOOD_CODE, judgements
 from stickslip.report.axis_pictures import data_pictures, pictures_of
@@ -23,7 +24,6 @@ from stickslip.report.identification import HEIGHT, panel_of
 from stickslip.report.page import filled
 from stickslip.report.sliding_torque import sliding_of
 from stickslip.report.svg import embedded_svg
-from stickslip.whole_files import write_whole
 
 TABLE = 15
 """Number of estimates above which a table of all correlations is too wide."""

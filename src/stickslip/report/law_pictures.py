@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Law
+from stickslip.core.whole_files import draft_of
 from stickslip.jit import flat
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.report.plots import DATES, DPI, FORMATS, RC, WIDTH, Array, Curve, Panel, save, scaled
 from stickslip.report.styles import Style
 from stickslip.simulation.prescribed.motion import Samples, packed_numbers, torque_along
-from stickslip.spec import Law
-from stickslip.whole_files import draft_of
 
 USUAL_VELOCITY = 0.01  # rad/s, for a law without a declared scale: the thesis's Stribeck velocity
 USUAL_DISTANCE = 1e-4  # rad, for a law without presliding

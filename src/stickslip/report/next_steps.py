@@ -10,13 +10,13 @@ from pathlib import Path
 
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import REFERENCE_VELOCITY, USUAL_TIME
-from stickslip.errors import InputError
-from stickslip.identification.sliding import SlidingPosterior
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option, render
+from stickslip.core.record import SAME_COUNTS, Record, counts_of_step, encoder_step, row_period
 from stickslip.identification.estimate import Identification
 from stickslip.identification.needed_motions import MOTIONS, experiment_for
+from stickslip.identification.sliding import SlidingPosterior
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_option, render
-from stickslip.record import SAME_COUNTS, Record, counts_of_step, encoder_step, row_period
 from stickslip.report.after_a_map import after_a_map
 from stickslip.report.sliding_torque import beaten, sliding_of
 

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import unwritable
+from stickslip.core.errors import unwritable
+from stickslip.core.whole_files import draft_of
 from stickslip.report.styles import MARKS, Style
-from stickslip.whole_files import draft_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

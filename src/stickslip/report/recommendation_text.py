@@ -11,7 +11,7 @@ from stickslip.control.learned import told
 from stickslip.control.linear import Cascade
 from stickslip.control.registry import control_law
 from stickslip.identification.identified_file import Identified
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation.beside import Beside
 from stickslip.recommendation.candidates import Candidate
 from stickslip.recommendation.course import measured

@@ -14,6 +14,7 @@ import numpy as np
 
 from stickslip.analyse.controller_margins import LATEST, ControllerStability
 from stickslip.analyse.wording import quantity
+from stickslip.core.whole_files import write_whole
 from stickslip.identification.estimate import Picture
 from stickslip.identification.identified_file import Identified
 from stickslip.recommendation.candidate_run import Trial
@@ -36,7 +37,6 @@ from stickslip.report.recommendation_text import (
     worst_left,
 )
 from stickslip.report.styles import REFERENCE, Style
-from stickslip.whole_files import write_whole
 
 BEFORE, AFTER = Style("#D55E00", width=0.9), Style("#0072B2", width=1.1)
 HEIGHT, TALLER = 1.35, 1.75

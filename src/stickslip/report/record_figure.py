@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 from stickslip.report import plots
 from stickslip.report.plots import Curve, Panel
 from stickslip.report.styles import REFERENCE, Style

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import unwritable
-from stickslip.record import Record
+from stickslip.core.errors import unwritable
+from stickslip.core.record import Record
+from stickslip.core.whole_files import write_whole
 from stickslip.report.conclusions import rig_conclusion
 from stickslip.report.html import image
 from stickslip.report.page import filled
@@ -20,7 +21,6 @@ from stickslip.report.styles import REFERENCE, style_of
 from stickslip.studies.experiments import Experiment, ExperimentView, experiments_of
 from stickslip.studies.result import Run, StudyResult
 from stickslip.thesis.rig_verdicts import Judged, judged_over, main_share
-from stickslip.whole_files import write_whole
 
 MARKS = {True: ("yes", "holds"), False: ("no", "does not hold"), None: ("open", "not run")}
 WINDOWS = {"low": (2.5, 5.0), "high": (0.0, 20.0), "step": (0.0, 1.5)}

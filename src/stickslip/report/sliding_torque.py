@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.identification.rows import OVERLAP, Block
-from stickslip.identification.sliding import SlidingPosterior
-from stickslip.identification.windows import apply_at, window_weights
 from stickslip.identification.estimate import Identification
 from stickslip.identification.monte_carlo import resisting_torque
 from stickslip.identification.regression.force_error import model_torque
 from stickslip.identification.regression.inverse import InverseDynamics
+from stickslip.identification.rows import OVERLAP, Block
+from stickslip.identification.sliding import SlidingPosterior
+from stickslip.identification.windows import apply_at, window_weights
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from stickslip.spec import Field
+from stickslip.core.spec import Field
 from stickslip.studies.planned_run import PlannedRun
 from stickslip.sweeps.numbers import INERTIA, parts
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import ParamSpec, TypeVar
 
-from stickslip.errors import RigError
+from stickslip.core.errors import RigError
 
 BUDGET = 0.1
 """Default delay that a controller may accumulate, s"""

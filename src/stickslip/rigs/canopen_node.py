@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from stickslip.errors import DriveFault, InputError, MessageLost, RigError
+from stickslip.core.errors import DriveFault, InputError, MessageLost, RigError
 from stickslip.rigs import cia402 as cia
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Any
 
-from stickslip.errors import InputError, MeasurementFault, RigError
+from stickslip.core.errors import InputError, MeasurementFault, RigError
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, Rig
 
 FASTEST, SLOWEST = 1e-7, 1e5

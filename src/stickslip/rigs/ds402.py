@@ -28,8 +28,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from stickslip.config import Table
-from stickslip.errors import DriveFault, InputError, MessageLost, RigError
+from stickslip.core.config import Table
+from stickslip.core.errors import DriveFault, InputError, MessageLost, RigError
 from stickslip.rigs import cia402 as cia
 from stickslip.rigs.canopen_node import CanopenNode
 from stickslip.rigs.files import limits_in

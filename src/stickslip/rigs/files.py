@@ -19,8 +19,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from stickslip.config import Table, read_toml
-from stickslip.errors import InputError, StickslipError
+from stickslip.core.config import Table, read_toml
+from stickslip.core.errors import InputError, StickslipError
 from stickslip.rigs.declared import checked
 from stickslip.rigs.kinds import rig_kind, rig_kind_names
 from stickslip.rigs.rig import Limits, Rig, RigKind

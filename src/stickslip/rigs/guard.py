@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 
-from stickslip.errors import (
+from stickslip.core.errors import (
     DriveFault,
     InputError,
     Interrupted,
@@ -14,6 +14,7 @@ from stickslip.errors import (
     RigError,
     StickslipError,
 )
+from stickslip.core.stream import Stream
 from stickslip.rigs.loop_sample import BOUNDS, MEASURED, REMEMBERED, SAFETY, Control
 from stickslip.rigs.rig import LIMIT_UNITS, Limits
 from stickslip.rigs.safety import (
@@ -34,7 +35,6 @@ from stickslip.rigs.safety import (
     UNBOUNDED,
     Safety,
 )  # fmt: skip
-from stickslip.stream import Stream
 
 STATE = Safety._fields.index("state")
 """Every sample reads it, and an index takes a quarter of the time of a name."""

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import Interrupted
+from stickslip.core.errors import Interrupted
 from stickslip.jit import compiled_notice
 
 ALWAYS = ("SIGINT", "SIGTERM", "SIGBREAK")

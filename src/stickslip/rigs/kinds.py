@@ -6,8 +6,8 @@ import importlib
 import os
 from pathlib import Path
 
-from stickslip import plugins
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.models import plugins
 from stickslip.rigs import RIGS
 from stickslip.rigs.rig import RigKind
 

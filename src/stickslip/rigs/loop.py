@@ -23,9 +23,10 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from stickslip.control.controller import Controller
-from stickslip.errors import InputError, MessageLost, Overrun, RigError
-from stickslip.messages import name_option
-from stickslip.record import Record
+from stickslip.core.errors import InputError, MessageLost, Overrun, RigError
+from stickslip.core.messages import name_option
+from stickslip.core.record import Record
+from stickslip.core.stream import Stream
 from stickslip.rigs.budget import BUDGET, Budget, Watch
 from stickslip.rigs.declared import FIELDS, answer, blamed, checked, last_resort
 from stickslip.rigs.guard import CONTROLLER, EXCHANGE, Guard, clock_fault
@@ -35,7 +36,6 @@ from stickslip.rigs.realtime import TIMES, Account, Pace, soft_real_time
 from stickslip.rigs.rig import BlockRig, Limits, Measurement, Rig, Setpoint, insist_on_setpoints, setpoints
 from stickslip.rigs.safety import RATE, STOPPED, STOPPING
 from stickslip.rigs.step import Step
-from stickslip.stream import Stream
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Result = TypeVar("Result")
@@ -56,7 +56,7 @@ class Loop:
     ----------
     rig : Rig
     path : path or None
-        File of the record (`stickslip.stream`), which must not exist yet; None keeps it in memory.
+        File of the record (`stickslip.core.stream`), which must not exist yet; None keeps it in memory.
     meta : mapping
         Entries for the record's meta.
     limits : Limits or None

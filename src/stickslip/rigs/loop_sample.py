@@ -13,11 +13,11 @@ from stickslip.control.controller import Controller
 from stickslip.control.learned import after
 from stickslip.control.linear import Gains
 from stickslip.control.sample_time import sampled_by
+from stickslip.core.spec import Surroundings, fields_of
 from stickslip.jit import call_guarded, compiled_guarded, flat, kernel, pointer, pointer_at, record_at
 from stickslip.rigs.rig import Limits, Measurement, Setpoint
 from stickslip.rigs.safety import STOPPED, Safety, bounds, guarded_by
 from stickslip.rigs.safety import Bounds as BoundNames
-from stickslip.spec import Surroundings, fields_of
 from stickslip.subset import Layout
 
 UNITS = {

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.errors import InputError, suggestion
+from stickslip.core.errors import InputError, suggestion
 from stickslip.rigs.loop_sample import Control
 from stickslip.rigs.rig import BlockRig, Capabilities, Limits, Measurement, Rig
 

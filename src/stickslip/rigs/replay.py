@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.capacity import number_of
-from stickslip.config import Table
-from stickslip.errors import InputError, RigError
+from stickslip.core.config import Table
+from stickslip.core.errors import InputError, RigError
+from stickslip.core.record import Record
+from stickslip.core.resources import number_of
 from stickslip.readers import read
-from stickslip.record import Record
 from stickslip.rigs.declared import FASTEST, SLOWEST
 from stickslip.rigs.files import limits_in
 from stickslip.rigs.rig import Capabilities, Limits, Measurement, RigKind, Watchdog

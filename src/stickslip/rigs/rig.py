@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.errors import InputError, ParameterError
 
 if TYPE_CHECKING:
-    from stickslip.config import Table
+    from stickslip.core.config import Table
     from stickslip.rigs.loop_sample import Control
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -242,8 +242,8 @@ class Capabilities:
 class Rig(Protocol):
     """Accepts a torque every sample time and returns measurements.
 
-    ``open``, ``exchange`` and ``pause`` raise `stickslip.errors.RigError`: `MessageLost` if the rig did not answer in
-    time, `DriveFault` if it answered with a fault. `exchange` first sends, then waits for the answer: the loop
+    ``open``, ``exchange`` and ``pause`` raise `stickslip.core.errors.RigError`: `MessageLost` if the rig did not answer
+    in time, `DriveFault` if it answered with a fault. `exchange` first sends, then waits for the answer: the loop
     continues to call it while it ramps the torque to zero, whatever it raises.
     """
 
@@ -309,7 +309,7 @@ class RigKind:
     name : str
     build : callable
         ``build(settings) -> Rig`` from the ``[rig]`` table of a TOML file (`stickslip.rigs.files`); raises
-        `stickslip.errors.InputError` for invalid settings.
+        `stickslip.core.errors.InputError` for invalid settings.
     title : str
         One line for people.
     """

@@ -35,10 +35,10 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.binding import bound
 from stickslip.control.composition import follow, sample
+from stickslip.core.rebinding import bound
+from stickslip.core.spec import Par
 from stickslip.rigs.rig import Limits
-from stickslip.spec import Par
 
 # States; from STOPPED on no sample follows. ENDED: the segment's travel is reached, which is no fault; the next segment
 # goes on.

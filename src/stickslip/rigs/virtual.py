@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.config import Table
-from stickslip.errors import InputError
+from stickslip.core.config import Table
+from stickslip.core.errors import InputError
 from stickslip.jit import kernel
 from stickslip.machines.files import machine
 from stickslip.machines.machine import IMPERFECTIONS, Machine

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.jit import call_profile, call_step, kernel, pointer
 from stickslip.simulation.case_arrays import Array, Case, surroundings
 

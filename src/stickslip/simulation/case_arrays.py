@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stickslip.control.controller import Controller
-from stickslip.errors import UnknownName
+from stickslip.core.errors import UnknownName
+from stickslip.core.spec import Bristle, Elements, Surroundings
 from stickslip.jit import LawPointers, compiled_law, compiled_profile, flat
 from stickslip.laws.slip_rule import SLIP_RULE
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
-from stickslip.spec import Bristle, Elements, Surroundings
+from stickslip.models.model import Model, Reference
 from stickslip.subset import Layout
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

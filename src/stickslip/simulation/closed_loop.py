@@ -10,21 +10,21 @@ from typing import Any, cast
 import numpy as np
 
 import stickslip
-from stickslip.arguments import arguments_checked
-from stickslip.capacity import insist_on_memory
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
-from stickslip.errors import InputError, ModelRemark, ParameterError
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.errors import InputError, ModelRemark, ParameterError
+from stickslip.core.record import Record
+from stickslip.core.reprs import Vector
+from stickslip.core.resources import insist_on_memory
+from stickslip.core.type_rules import is_number
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Reference
-from stickslip.record import Record
-from stickslip.rules import is_number
+from stickslip.models.model import Reference
 from stickslip.simulation import case_arrays
 from stickslip.simulation.case_arrays import COLUMNS, UNITS, Case, Outcome, lay_out, slip_rules
 from stickslip.simulation.integrators import insist_on_steps, integrated, reason, without_tolerance
 from stickslip.simulation.metrics import metrics
-from stickslip.values import Vector
 
 SAMPLE = 100.0
 """Bytes that the schedule of one sample takes while it is made"""

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from stickslip.errors import (
+from stickslip.core.errors import (
     Divergence,
     EventStorm,
     InputError,

@@ -15,14 +15,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from stickslip.capacity import insist_on_jobs
-from stickslip.config import Table, read_toml
 from stickslip.control.catalogue import CATALOGUE, LOOPS, Belief, compensated
 from stickslip.control.controller import Controller
-from stickslip.errors import ConfigError, SimulationError, UnknownName
+from stickslip.core.config import Table, read_toml
+from stickslip.core.errors import ConfigError, SimulationError, UnknownName
+from stickslip.core.resources import insist_on_jobs
 from stickslip.machines.machine import Machine
 from stickslip.machines.numbers import with_numbers
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.studies import build, files
 from stickslip.studies.bench_metrics import judged

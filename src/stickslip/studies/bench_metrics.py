@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.record import Record
 from stickslip.recommendation.swings import back_and_forth
-from stickslip.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Places = np.ndarray[Any, np.dtype[np.bool_]]

@@ -7,21 +7,21 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from stickslip import plugins
-from stickslip.arguments import says_number
-from stickslip.config import Table, refuse_endless
 from stickslip.control.controller import Controller
 from stickslip.control.files import Placement, composed, placement
 from stickslip.control.registry import law_files
-from stickslip.control_spec import ControlLaw
-from stickslip.errors import InputError
+from stickslip.core.arguments import says_number
+from stickslip.core.config import Table, refuse_endless
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Law
 from stickslip.machines.files import machine, machine_in
 from stickslip.machines.machine import IMPERFECTIONS, Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
-from stickslip.model_tables import friction_laws, model, models, refuse_unknown
+from stickslip.models import plugins
+from stickslip.models.model import Model, Reference
+from stickslip.models.tables import friction_laws, model, models, refuse_unknown
 from stickslip.simulation.integrators import INTEGRATORS
-from stickslip.spec import Law
 
 __all__ = [
     "Numerics",

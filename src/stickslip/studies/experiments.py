@@ -16,16 +16,16 @@ import numpy as np
 
 from stickslip.analyse import tracking
 from stickslip.analyse.tracking import tracking_metrics
-from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.control.files import is_composed
 from stickslip.control.linear import LINEAR
 from stickslip.control.sample_time import sampled_by
-from stickslip.errors import Interrupted, RigError
+from stickslip.core.config import Table
+from stickslip.core.errors import Interrupted, RigError
+from stickslip.core.record import Record
 from stickslip.machines.files import LIBRARY, library
 from stickslip.machines.machine import IMPERFECTIONS, Machine
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models.model import Model
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import VirtualRig

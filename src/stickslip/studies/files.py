@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.messages import ask_for_place
-from stickslip.record import Record
+from stickslip.core.errors import InputError
+from stickslip.core.messages import ask_for_place
+from stickslip.core.record import Record
+from stickslip.core.whole_files import draft_of, prepared_folder, write_whole
 from stickslip.studies.parquet_table import write_parquet
 from stickslip.studies.provenance import engine_hash, file_hash, versions
 from stickslip.studies.result import Run
-from stickslip.whole_files import draft_of, prepared_folder, write_whole
 
 if TYPE_CHECKING:
     from stickslip.studies.plan import Study

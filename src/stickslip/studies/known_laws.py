@@ -7,12 +7,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
-from stickslip.config import Table
 from stickslip.control.files import listed
-from stickslip.control_spec import PLACES
-from stickslip.errors import ConfigError
+from stickslip.core.config import Table
+from stickslip.core.control_spec import PLACES
+from stickslip.core.errors import ConfigError
 from stickslip.machines.machine import Machine
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 
 class Design(NamedTuple):

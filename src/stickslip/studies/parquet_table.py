@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.whole_files import draft_of
+from stickslip.core.whole_files import draft_of
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

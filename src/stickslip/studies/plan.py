@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from stickslip.config import Table, read_toml
 from stickslip.control.controller import Controller
-from stickslip.errors import ConfigError, UnknownName, suggestion
+from stickslip.core.config import Table, read_toml
+from stickslip.core.errors import ConfigError, UnknownName, suggestion
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.studies import build
 from stickslip.studies.build import Numerics, Placement
 from stickslip.studies.known_laws import Design, KnownLaws, laws_in

@@ -11,12 +11,12 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from stickslip.control.controller import Controller
-from stickslip.errors import ConfigError, InputError, SimulationError
+from stickslip.core.errors import ConfigError, InputError, SimulationError
+from stickslip.core.record import Record
 from stickslip.machines.machine import Machine
 from stickslip.machines.numbers import machine_numbers
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Reference
-from stickslip.record import Record
+from stickslip.models.model import Reference
 from stickslip.simulation.closed_loop import check_machine_run, prepare, run_case, simulate
 from stickslip.simulation.integrators import integrator_for
 from stickslip.studies.build import Numerics

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import stickslip
-from stickslip.origin import TEXT
+from stickslip.core.pickling import TEXT
 
 WITHOUT_PHYSICS = ("analyse", "cli", "report", "study", "sweep")
 """Folders of the package that cannot change a run's numbers."""

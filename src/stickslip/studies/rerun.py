@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.studies.files import read_manifest
 from stickslip.studies.plan import load
 from stickslip.studies.provenance import other_versions

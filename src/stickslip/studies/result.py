@@ -9,8 +9,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip.extras import needed
-from stickslip.record import Record
+from stickslip.core.extras import needed
+from stickslip.core.record import Record
 
 if TYPE_CHECKING:
     import pandas

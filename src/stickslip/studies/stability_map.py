@@ -21,10 +21,10 @@ from stickslip.analyse.stability_result import Map, SafeGain
 from stickslip.control.compensator import Feedback
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.errors import RigError
+from stickslip.core.errors import RigError
+from stickslip.core.record import Record
 from stickslip.machines.machine import Machine
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models.model import Model
 from stickslip.rigs.loop import Loop as RigLoop
 from stickslip.rigs.rig import setpoints
 from stickslip.rigs.virtual import VirtualRig

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from stickslip.capacity import insist_on_jobs
+from stickslip.core.resources import insist_on_jobs
 from stickslip.studies import files
 from stickslip.studies.plan import Study, load, load_run, select
 from stickslip.studies.planned_run import Executed, PlannedRun

@@ -18,8 +18,8 @@ import ast
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from stickslip.errors import LawError
-from stickslip.returning import MUST, gives, missing_return
+from stickslip.core.errors import LawError
+from stickslip.core.return_check import MUST, gives, missing_return
 from stickslip.subset.layout import Layout, law_layouts
 from stickslip.subset.source import parsed
 from stickslip.subset.translator import Names, Target, Translator, View

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from stickslip.spec import Field, Law, Surroundings
+from stickslip.core.spec import Field, Law, Surroundings
 
 PARAMETER, INPUT, SURROUNDINGS = "a parameter", "an input", "a quantity of the surroundings"
 """What the fields are that a law may only read."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from importlib.util import decode_source
 from typing import Any
 
-from stickslip.errors import LawError
-from stickslip.origin import TEXT
+from stickslip.core.errors import LawError
+from stickslip.core.pickling import TEXT
 
 UNREADABLE = (AttributeError, IndexError, OSError, SyntaxError, TypeError, tokenize.TokenError)
 """What Python raises of code whose text is elsewhere, or another one."""

@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from stickslip.binding import NEGATIVE, negative
-from stickslip.errors import LawError, suggestion
+from stickslip.core.errors import LawError, suggestion
+from stickslip.core.rebinding import NEGATIVE, negative
 from stickslip.subset.layout import Layout
 from stickslip.subset.remedies import REMEDY, instead_of
 from stickslip.subset.source import Place, arguments_of

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.config import Table
-from stickslip.errors import ConfigError, InputError, suggestion
+from stickslip.core.config import Table
+from stickslip.core.errors import ConfigError, InputError, suggestion
 from stickslip.studies.planned_run import PlannedRun
 from stickslip.sweeps.numbers import belongs, known, value_of, varied
 from stickslip.sweeps.ranges import admitted

@@ -17,14 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError, unwritable
-from stickslip.messages import ask_for_place
+from stickslip.core.errors import InputError, unwritable
+from stickslip.core.messages import ask_for_place
+from stickslip.core.whole_files import DRAFTS, draft_of
 from stickslip.studies.files import KEYS
 from stickslip.studies.parquet_table import write_parquet
 from stickslip.studies.planned_run import PlannedRun
 from stickslip.sweeps.block import Block
 from stickslip.sweeps.plan import Sweep
-from stickslip.whole_files import DRAFTS, draft_of
 
 OVERHEAD = 4000
 """Bytes that the file of a block takes in addition to its rows."""

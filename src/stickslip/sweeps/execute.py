@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from stickslip.capacity import insist_on_jobs, insist_on_memory
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
+from stickslip.core.resources import insist_on_jobs, insist_on_memory
 from stickslip.identification.estimate import silent
-from stickslip.messages import name_option
 from stickslip.studies.files import claim_folder, save_manifest
 from stickslip.studies.study import interrupts_between_runs
 from stickslip.sweeps import dataset

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.errors import InputError, ParameterError, SimulationError
+from stickslip.core.errors import InputError, ParameterError, SimulationError
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.simulation import case_arrays

@@ -20,10 +20,10 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains, place
-from stickslip.errors import UnknownName
+from stickslip.core.errors import UnknownName
 from stickslip.machines.machine import Machine
 from stickslip.machines.numbers import machine_numbers, with_friction, with_numbers
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.studies.planned_run import PlannedRun
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

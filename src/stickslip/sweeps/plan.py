@@ -11,8 +11,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.config import Table, read_toml
-from stickslip.errors import ConfigError, suggestion
+from stickslip.core.config import Table, read_toml
+from stickslip.core.errors import ConfigError, suggestion
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.identified_file import Identified, identified_in, read_identified
 from stickslip.simulation.metrics import METRICS

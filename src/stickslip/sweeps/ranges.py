@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from stickslip.errors import InputError
-from stickslip.spec import Par
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Par
 from stickslip.studies.planned_run import PlannedRun
 from stickslip.sweeps.numbers import belongs, parts, value_of
 from stickslip.sweeps.sample import Spread

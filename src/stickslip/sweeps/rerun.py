@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.studies.files import read_manifest
 from stickslip.studies.provenance import other_versions
 from stickslip.studies.rerun import Comparison

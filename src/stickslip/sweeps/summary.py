@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.whole_files import draft_of
 from stickslip.studies.files import KEYS
 from stickslip.sweeps.checked_numbers import not_varied, not_varied_lines
 from stickslip.sweeps.dataset import read
 from stickslip.sweeps.plan import Sweep
-from stickslip.whole_files import draft_of
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 PERCENTILES = (5, 50, 95, 100)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.studies.planned_run import PlannedRun
 from stickslip.sweeps.measured import measured
 from stickslip.sweeps.numbers import belongs, own_name, value_of

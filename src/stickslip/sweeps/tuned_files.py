@@ -6,9 +6,9 @@ import csv
 import json
 from pathlib import Path
 
+from stickslip.core.whole_files import draft_of, write_whole
 from stickslip.sweeps.plan import Sweep
 from stickslip.sweeps.tune import Tuned
-from stickslip.whole_files import draft_of, write_whole
 
 
 def write(folder: Path, sweep: Sweep, tuned: Tuned) -> list[Path]:

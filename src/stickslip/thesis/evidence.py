@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 
 STANDSTILL_SPEED, REFERENCE_MOVES, SHORTEST_STANDSTILL = 1e-3, 2e-3, 10e-3  # rad/s, rad/s, s; as the metrics'
 NEAR_ZERO, AWAY = 0.3, 0.5  # shares of the reference's peak velocity

@@ -10,9 +10,9 @@ from pathlib import Path
 from stickslip.control.catalogue import CATALOGUE
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
-from stickslip.errors import InputError, UnknownName
-from stickslip.messages import name_option
-from stickslip.model import Model
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import name_option
+from stickslip.models.model import Model
 from stickslip.recommendation.beside import Own
 from stickslip.recommendation.candidate_run import Drive
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from stickslip.arguments import arguments_checked
+from stickslip.core.arguments import arguments_checked
 from stickslip.identification.compare.change import Comparison, compare_models
 from stickslip.identification.identified_file import Identified, read_identified
 from stickslip.verbs.identification import IdentificationResult

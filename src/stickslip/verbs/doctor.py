@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Unpack
 
-from stickslip.arguments import arguments_checked
-from stickslip.errors import InputError
-from stickslip.finding import Finding, sorted_findings
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding, sorted_findings
+from stickslip.core.messages import name_option
 from stickslip.identification.doctor import Diagnosis, examine
-from stickslip.messages import name_option
 from stickslip.readers.cut import file_rows, pieces, range_words
 from stickslip.verbs.reading import Log, Reading, open_log
 

@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
-from stickslip.identification.memo import EstimateSliding
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
+from stickslip.core.messages import render
+from stickslip.core.record import Record
 from stickslip.identification.doctor import Diagnosis, examine, of_arrays
 from stickslip.identification.doctor.steady_table import is_steady_table
-from stickslip.messages import render
+from stickslip.identification.memo import EstimateSliding
 from stickslip.readers.cut import pieces
 from stickslip.readers.remembered import CODES
-from stickslip.record import Record
 from stickslip.report.identified import Source
 from stickslip.verbs.reading import Log, doctor_of, named
 

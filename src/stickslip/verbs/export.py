@@ -12,11 +12,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stickslip.arguments import arguments_checked, constructor_checked
-from stickslip.config import Document, Table, read_toml
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
-from stickslip.errors import InputError, unwritable
+from stickslip.core.arguments import arguments_checked, constructor_checked
+from stickslip.core.config import Document, Table, read_toml
+from stickslip.core.errors import InputError, unwritable
+from stickslip.core.messages import name_option, rendered, units_of_axis
+from stickslip.core.spec import Surroundings
+from stickslip.core.type_rules import with_article
+from stickslip.core.whole_files import prepared_folder, write_together
 from stickslip.exports import CONTROLLER_TARGETS, TARGETS, controller_target, target_named
 from stickslip.exports.controllers import what_it_is
 from stickslip.exports.job import Check, Export, Job
@@ -24,10 +28,7 @@ from stickslip.exports.maps import MAP_TARGETS, MapTarget, map_target, written
 from stickslip.exports.target import Target, settings_of
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.rigid import RigidAxis
-from stickslip.messages import name_option, rendered, units_of_axis
-from stickslip.model import Model
-from stickslip.rules import with_article
-from stickslip.spec import Surroundings
+from stickslip.models.model import Model
 from stickslip.studies.study import load_run
 from stickslip.verbs import own_files
 from stickslip.verbs.export_compensator import CompensatorOptions, compensator_of, recommendation_in
@@ -36,7 +37,6 @@ from stickslip.verbs.export_notes import around_of, axis_of, notes_on, notes_on_
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import require
 from stickslip.verbs.recommendation import RecommendationResult
-from stickslip.whole_files import prepared_folder, write_together
 
 Source = (
     IdentificationResult | RecommendationResult | Model | Controller | PositionMap | str

@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from stickslip.config import Table
 from stickslip.control.compensator import Feedback, Feedforward
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
 from stickslip.control.recommended import Recommended, recommended_in
-from stickslip.errors import InputError
-from stickslip.messages import name_option
-from stickslip.model import Model
+from stickslip.core.config import Table
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
+from stickslip.models.model import Model
 from stickslip.verbs.export_notes import axis_of, constant_torque
 
 NUMBERS = ("gain", "lead", "deadband", "offset", "inertia_feedforward", "filter_hz")

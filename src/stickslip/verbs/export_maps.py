@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from stickslip.config import read_toml
-from stickslip.errors import InputError
+from stickslip.core.config import read_toml
+from stickslip.core.errors import InputError
 from stickslip.machines.position_map import PositionMap
-from stickslip.model import refuse_unknown_keys
+from stickslip.models.model import refuse_unknown_keys
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.kinds import kind_of, require
 

@@ -6,15 +6,15 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
-from stickslip.config import Table
 from stickslip.control.controller import Controller
 from stickslip.control.recommended import Recommended, recommended_in
+from stickslip.core.config import Table
+from stickslip.core.messages import axis_unit, name_option
 from stickslip.exports.controllers import depends_on, given_by
 from stickslip.exports.job import Job
 from stickslip.exports.nearest import read_by
 from stickslip.exports.target import Target
 from stickslip.machines.angle import AngleMap
-from stickslip.messages import axis_unit, name_option
 
 SLOW = 0.02
 """s: sample times above it are told; a tenth of a period of 5 Hz."""

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.approval import allow_code
-from stickslip.arguments import arguments_checked, constructor_checked
-from stickslip.config import Table
-from stickslip.errors import InputError
-from stickslip.extras import needed
-from stickslip.finding import Finding
+from stickslip.core.arguments import arguments_checked, constructor_checked
+from stickslip.core.code_approval import allow_code
+from stickslip.core.config import Table
+from stickslip.core.errors import InputError
+from stickslip.core.extras import needed
+from stickslip.core.finding import Finding
+from stickslip.core.whole_files import prepared_folder
 from stickslip.identification.doctor.steady_table import is_steady_table
 from stickslip.identification.estimate import Estimate, Held, Identification, Picture
 from stickslip.identification.identified_file import Identified, identified_in
@@ -29,12 +30,11 @@ from stickslip.machines.identified import identified_machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.report.answers import Answers, answers_of
 from stickslip.report.identified import Source, files_of, write_identification
 from stickslip.report.result_text import interval_text, result_lines_in_python
 from stickslip.verbs import own_files
-from stickslip.whole_files import prepared_folder
 
 if TYPE_CHECKING:
     import pandas

@@ -12,30 +12,30 @@ from typing import Any, Literal, Unpack, cast
 
 import numpy as np
 
-from stickslip import plugins
-from stickslip.arguments import arguments_checked
-from stickslip.config import read_toml
 from stickslip.control.own_loop import ReferenceVelocity, loop_text
-from stickslip.errors import InputError
-from stickslip.finding import Finding, sorted_findings
-from stickslip.identification.memo import SlidingMemo
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.config import read_toml
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding, sorted_findings
+from stickslip.core.messages import name_loop, name_option, name_parameter, render, units_of_axis
+from stickslip.core.record import Record, encoder_step, row_period
+from stickslip.core.reprs import same
+from stickslip.core.spec import Law
 from stickslip.identification.doctor import Diagnosis
 from stickslip.identification.doctor.steady_table import is_steady_table
 from stickslip.identification.estimate import Identification, silent
 from stickslip.identification.evidence import without_inverted_rest
 from stickslip.identification.experiment import DRIVES
 from stickslip.identification.held import held_in
+from stickslip.identification.memo import SlidingMemo
 from stickslip.identification.methods import method_named, methods_by_option
 from stickslip.identification.methods.method import Method, Options, given_in
-from stickslip.messages import name_loop, name_option, name_parameter, render, units_of_axis
-from stickslip.model import Model
+from stickslip.models import plugins
+from stickslip.models.model import Model
 from stickslip.readers.convert import pendulum_before_gear
 from stickslip.readers.cut import file_rows
 from stickslip.readers.derive import positioned
-from stickslip.record import Record, encoder_step, row_period
 from stickslip.report.identified import Source
-from stickslip.spec import Law
-from stickslip.values import same
 from stickslip.verbs.examiner import Examiner
 from stickslip.verbs.export_notes import constant_torque
 from stickslip.verbs.identification import IdentificationResult

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
-from stickslip.config import toml_in
+from stickslip.core.config import toml_in
 
 WORDS = {
     "record": ("a record", "a record (CSV, MAT, HDF5, Parquet, ...)"),
@@ -93,8 +93,8 @@ def require(path: object, *wanted: str) -> None:
     InputError
         That names both kinds and the verb that takes the file.
     """
-    from stickslip.errors import InputError
-    from stickslip.rules import with_article
+    from stickslip.core.errors import InputError
+    from stickslip.core.type_rules import with_article
 
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(

@@ -8,15 +8,16 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any, cast
 
-from stickslip import approval, plugins
 from stickslip.control.read_law import read
 from stickslip.control.registry import control_law
 from stickslip.control.written import NameOf
-from stickslip.control_spec import ControlLaw
-from stickslip.errors import ConfigError, InputError
-from stickslip.model import Model
-from stickslip.model_tables import written
-from stickslip.spec import Law
+from stickslip.core import code_approval
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.errors import ConfigError, InputError
+from stickslip.core.spec import Law
+from stickslip.models import plugins
+from stickslip.models.model import Model
+from stickslip.models.tables import written
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.plain_given import Place, absolute, mapping_at, plain
 from stickslip.verbs.recommendation import RecommendationResult
@@ -45,7 +46,7 @@ def insist_on_home(law: Law | ControlLaw, at: Place) -> None:
                 f"{at}: law {law.name!r} was read from {plain_law.path}, which is gone or has changed since; restore "
                 "the file, or make the object anew"
             )
-        approval.asked_for(plain_law.path, ran)  # It has run here, as an object's.
+        code_approval.asked_for(plain_law.path, ran)  # It has run here, as an object's.
         return
     try:
         if isinstance(law, ControlLaw):

@@ -14,22 +14,22 @@ import numpy as np
 from stickslip.analyse.learning import Convergence, over_angle, over_time, widest
 from stickslip.analyse.machine_axis import axis_of
 from stickslip.analyse.presliding_loop import Axis
-from stickslip.arguments import arguments_checked, constructor_checked
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.learning import TimeTable, low_pass
 from stickslip.control.sample_time import sampled_by
 from stickslip.control.written import tables_of
-from stickslip.errors import InputError
+from stickslip.core.arguments import arguments_checked, constructor_checked
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
+from stickslip.core.spec import Surroundings
+from stickslip.core.whole_files import prepared_folder, write_whole
 from stickslip.machines.drivetrain import Drivetrain
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Reference
-from stickslip.record import Record
+from stickslip.models.model import Reference
 from stickslip.simulation.closed_loop import simulate
 from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, replay
-from stickslip.spec import Surroundings
-from stickslip.whole_files import prepared_folder, write_whole
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 LARGEST = 1e6

@@ -11,19 +11,19 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.finding import Finding
+from stickslip.core.errors import InputError
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_option, render
+from stickslip.core.record import Record
 from stickslip.identification.doctor import timing, units
 from stickslip.identification.doctor.view import View
 from stickslip.identification.motion import REFERENCES, Motion, motion_of
-from stickslip.messages import name_option, render
-from stickslip.model import Reference
+from stickslip.models.model import Reference
 from stickslip.readers import profiles, remembered
 from stickslip.readers.convert import Drive
 from stickslip.readers.derive import positioned
 from stickslip.readers.reading import CHANNELS, open_table, record_of
 from stickslip.recommendation.course import measured
-from stickslip.record import Record
 from stickslip.verbs.kinds import require
 from stickslip.verbs.reading import Log, Reading, open_log
 

@@ -11,9 +11,9 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
-from stickslip.errors import InputError
-from stickslip.messages import name_option
-from stickslip.whole_files import write_whole
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
+from stickslip.core.whole_files import write_whole
 
 LEDGER = ".stickslip-written"
 

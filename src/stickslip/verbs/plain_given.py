@@ -13,10 +13,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.arguments import refusal
-from stickslip.config import BARE_KEY
-from stickslip.errors import ConfigError, InputError, unwritable
-from stickslip.rules import Wrong
+from stickslip.core.arguments import refusal
+from stickslip.core.config import BARE_KEY
+from stickslip.core.errors import ConfigError, InputError, unwritable
+from stickslip.core.type_rules import Wrong
 
 PLAIN = "a number, text, True or False, a list or a mapping"
 FILES = {"law": ".py", "machine": ".toml", "model": ".toml"}

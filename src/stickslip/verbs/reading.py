@@ -11,17 +11,17 @@ from typing import Any, Literal, TypedDict, Unpack, cast
 
 from numpy.typing import ArrayLike
 
-from stickslip.arguments import arguments_checked, insist_on, rules_in, written
-from stickslip.errors import InputError, UnknownName
-from stickslip.finding import Finding
-from stickslip.messages import name_option
+from stickslip.core.arguments import arguments_checked, insist_on, rules_in, written
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_option
+from stickslip.core.record import Record
 from stickslip.readers import profiles, remembered
 from stickslip.readers.convert import Drive
 from stickslip.readers.cut import Cut, cut, parse_rows, unwrapped
 from stickslip.readers.in_memory import digest_of, table_in_memory, table_of_signals
 from stickslip.readers.reading import joined, open_table, record_of, with_source
 from stickslip.readers.table_columns import Table
-from stickslip.record import Record
 from stickslip.verbs.kinds import require
 
 Log = str | os.PathLike[str] | Record | Any

@@ -11,19 +11,19 @@ from typing import Any, Literal
 
 import numpy as np
 
-from stickslip.approval import allow_code
-from stickslip.arguments import arguments_checked
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller, sample_time_in
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import ReferenceVelocity, kind_of_loop, loop_text, split_loop
-from stickslip.errors import InputError
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.code_approval import allow_code
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_loop, name_option
 from stickslip.identification.identified_file import Identified
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.messages import name_loop, name_option
-from stickslip.model import Model, Reference
+from stickslip.models.model import Model, Reference
 from stickslip.recommendation import recommend as setting
 from stickslip.recommendation.candidate_run import Drive
 from stickslip.recommendation.resolution import encoder_for

@@ -11,13 +11,14 @@ from typing import Any
 
 from stickslip.analyse.controller_margins import ControllerStability, controller_stability
 from stickslip.analyse.machine_axis import axis_of
-from stickslip.arguments import arguments_checked, constructor_checked
-from stickslip.config import Table
 from stickslip.control.controller import Controller
-from stickslip.errors import InputError
+from stickslip.core.arguments import arguments_checked, constructor_checked
+from stickslip.core.config import Table
+from stickslip.core.errors import InputError
+from stickslip.core.whole_files import prepared_folder
 from stickslip.identification.identified_file import Identified
 from stickslip.identification.model_file import versions
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation.axes import plants_of
 from stickslip.recommendation.file import setting_table, write_setting
 from stickslip.recommendation.recommend import Candidate, Recommendation
@@ -32,7 +33,6 @@ from stickslip.report.recommendation_text import (
 )
 from stickslip.verbs import own_files
 from stickslip.verbs.identification import IdentificationResult
-from stickslip.whole_files import prepared_folder
 
 
 @constructor_checked

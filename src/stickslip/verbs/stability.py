@@ -8,15 +8,15 @@ from dataclasses import replace
 
 from stickslip.analyse.controller_margins import ControllerStability, controller_stability
 from stickslip.analyse.machine_axis import axis_of
-from stickslip.arguments import arguments_checked
 from stickslip.control.controller import Controller
 from stickslip.control.files import read_controller
 from stickslip.control.own_loop import USUAL_TIME
-from stickslip.errors import InputError
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.errors import InputError
 from stickslip.machines.files import load_machine
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.recommendation.plant import Plant
 
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from stickslip.arguments import arguments_checked
-from stickslip.errors import InputError
-from stickslip.messages import name_option
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
 from stickslip.studies import study as studies
 from stickslip.studies.bench import is_bench
 from stickslip.studies.plan import Study, load, select

@@ -10,18 +10,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from stickslip import plugins
 from stickslip.control.block import ControlBlock
 from stickslip.control.compensator import Compensator
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.written import NameOf, block_table, compensator_table, table_as_given
-from stickslip.control_spec import PLACES
-from stickslip.errors import ConfigError, InputError, ModelRemark, suggestion
+from stickslip.core.control_spec import PLACES
+from stickslip.core.errors import ConfigError, InputError, ModelRemark, suggestion
 from stickslip.machines.machine import Machine
 from stickslip.machines.rigid import RigidAxis
 from stickslip.machines.written import tables_of
-from stickslip.model import Reference, level_of_caller
+from stickslip.models import plugins
+from stickslip.models.model import Reference, level_of_caller
 from stickslip.studies.plan import BUILT_IN, Study
 from stickslip.verbs.identification import IdentificationResult
 from stickslip.verbs.laws_given import MODEL, HeldLaws, friction_table, insist_on_home, model_of, model_table

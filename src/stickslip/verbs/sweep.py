@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from stickslip.arguments import arguments_checked, constructor_checked
-from stickslip.capacity import insist_on_jobs
-from stickslip.errors import InputError
-from stickslip.extras import needed
+from stickslip.core.arguments import arguments_checked, constructor_checked
+from stickslip.core.errors import InputError
+from stickslip.core.extras import needed
+from stickslip.core.messages import name_option
+from stickslip.core.resources import insist_on_jobs
 from stickslip.identification.estimate import silent
-from stickslip.messages import name_option
 from stickslip.sweeps import dataset, execute
 from stickslip.sweeps.gains import too_few
 from stickslip.sweeps.plan import MOST_CASES, Sweep, load

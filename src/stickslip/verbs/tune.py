@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from stickslip.arguments import arguments_checked
-from stickslip.errors import InputError
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.errors import InputError
 from stickslip.studies.files import claim_folder, copy_inputs
 from stickslip.sweeps.plan import Sweep, load
 from stickslip.sweeps.tune import Tuned

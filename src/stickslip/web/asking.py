@@ -11,7 +11,7 @@ from typing import Any, cast
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
-from stickslip.errors import InputError, StickslipError
+from stickslip.core.errors import InputError, StickslipError
 from stickslip.web.projects import NotThere
 
 Handler = Callable[[Request], Awaitable[Response]]

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from stickslip.errors import InputError, StickslipError
+from stickslip.core.errors import InputError, StickslipError
 from stickslip.web.worker import plain
 
 CHANNELS = ("position_reference", "position", "error", "velocity", "motor_torque", "friction_torque")

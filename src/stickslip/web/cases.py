@@ -7,9 +7,9 @@ import math
 from collections.abc import Mapping
 from typing import Any, cast
 
-from stickslip import plugins
-from stickslip.errors import InputError
-from stickslip.spec import Described, Field
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Described, Field
+from stickslip.models import plugins
 
 PARTS = {
     "bandwidth_hz": "Hz", "damping": "-", "sample_time": "s", "encoder_counts": "counts a revolution",

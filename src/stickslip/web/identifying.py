@@ -137,7 +137,7 @@ def logs_named(project: Project, data: dict[str, Any]) -> list[Item]:
 
 def laws_to_identify() -> list[dict[str, str]]:
     """Return the candidate laws of identification: those with a torque at constant velocity."""
-    from stickslip import plugins
+    from stickslip.models import plugins
 
     laws = [plugins.law(name) for name in plugins.law_names()]
     return [{"name": law.name, "title": law.title or law.name} for law in laws if law.steady]
@@ -166,7 +166,7 @@ def identify_options(data: dict[str, Any]) -> dict[str, Any]:
     Refused
     """
     from stickslip.identification.methods import METHODS
-    from stickslip.plugins import law_names
+    from stickslip.models.plugins import law_names
 
     out: dict[str, Any] = {"method": chosen_names([data.get("method", "axis")], "method", tuple(METHODS))[0]}
     if laws := chosen_names(data.get("laws", []), "laws", (*law_names(), "all")):

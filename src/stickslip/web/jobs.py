@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.web.forks import POSSIBLE, Forked, Forks
 from stickslip.web.projects import NotThere, Project
 

@@ -9,8 +9,8 @@ PROJECT/studies/study-ID/about.json, result.json, study.toml, out/, report.html
 PROJECT/rigs/rig-ID/about.json, rig.toml, and what it names
 
 A project may come from somebody else, so its JSON contains only facts about its data. Approvals of code are kept per
-user (`stickslip.approval`), whether a rig is real is read from its file when it is armed, whether a job is running is
-known from the jobs of this server, and links that lead out of a project are refused.
+user (`stickslip.core.code_approval`), whether a rig is real is read from its file when it is armed, whether a job is
+running is known from the jobs of this server, and links that lead out of a project are refused.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, cast
 
-from stickslip.errors import InputError
-from stickslip.whole_files import prepared_folder, write_whole
+from stickslip.core.errors import InputError
+from stickslip.core.whole_files import prepared_folder, write_whole
 
 KINDS = {"logs": "log", "models": "model", "settings": "setting", "studies": "study", "rigs": "rig"}
 """Kinds of items, and the prefixes of their identifiers."""
@@ -107,7 +107,7 @@ def refuse_links(folder: Path, root: Path, shallow: bool = False) -> None:
 
 
 def digest_of(code: str) -> str:
-    """Return the SHA-256 of code as it is shown, for `stickslip.approval`."""
+    """Return the SHA-256 of code as it is shown, for `stickslip.core.code_approval`."""
     return hashlib.sha256(code.encode()).hexdigest()
 
 

@@ -14,7 +14,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.rigs.rig import LIMIT_UNITS, Limits, Rig
 from stickslip.web.worker import Said
 

@@ -256,7 +256,7 @@ def rig_of(project: Project, data: dict[str, Any]) -> Item | None:
 
 async def frames(job: Job, item: Item) -> AsyncIterator[dict[str, Any]]:
     """Stream the new measurements of the rig until the run ends."""
-    from stickslip.stream import rows_since
+    from stickslip.core.stream import rows_since
 
     path, after = item.folder / "live.stream", 0
     while True:

@@ -1,8 +1,8 @@
 """Routes of uploaded models, studies and rigs: store, inspect, and run once their code has been shown and approved.
 
 A TOML file may name Python code, which runs with all rights of the user. So it runs only if this user has approved the
-same bytes (`stickslip.approval`), in the page after its text was shown. Statements of a project about itself are
-ignored: the approval is for the text that was shown, identified by its SHA-256.
+same bytes (`stickslip.core.code_approval`), in the page after its text was shown. Statements of a project about itself
+are ignored: the approval is for the text that was shown, identified by its SHA-256.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from typing import Any, cast
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from stickslip import approval
-from stickslip.config import toml_in
-from stickslip.errors import CodeRefused
+from stickslip.core import code_approval
+from stickslip.core.config import toml_in
+from stickslip.core.errors import CodeRefused
+from stickslip.core.whole_files import write_whole
 from stickslip.verbs.kinds import WORDS, kind_of_toml
 from stickslip.web.asking import Refused, Table, body, text
 from stickslip.web.jobs import Job
 from stickslip.web.projects import Item, Project, words
 from stickslip.web.site import Site
-from stickslip.whole_files import write_whole
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_. -]{0,79}\.(toml|py|csv)", re.IGNORECASE)
 """Names that are kept because the TOML file refers to them; none leads out of the folder."""
@@ -69,7 +69,7 @@ def table(site: Site) -> Table:
         digest = text(await body(request), "sha256")
         if about.get("state") != "asks" or digest != shown["sha256"]:
             raise Refused(409, "the code has changed since it was shown; open the page again and review it")
-        approval.approve(str(item.folder / shown["name"]), digest)
+        code_approval.approve(str(item.folder / shown["name"]), digest)
         item.update(asks=None)
         return begin(project, item, LOOK, f"Running {shown['name']}")
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from stickslip.errors import CodeRefused, InputError
+from stickslip.core.errors import CodeRefused, InputError
 from stickslip.web import rig_tasks
 from stickslip.web.projects import Item, written_whole
 from stickslip.web.worker import Said, plain

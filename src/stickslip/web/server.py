@@ -12,8 +12,8 @@ from pathlib import Path
 
 import uvicorn
 
-from stickslip.errors import InputError
-from stickslip.messages import Surface, shown_on
+from stickslip.core.errors import InputError
+from stickslip.core.messages import Surface, shown_on
 from stickslip.web.app import Options, make_app
 from stickslip.web.security import new_token
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from starlette.requests import Request
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.web.bench import Bench
 from stickslip.web.jobs import Jobs
 from stickslip.web.projects import KINDS, Item, Project, Projects, refuse_links

@@ -12,12 +12,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.whole_files import draft_of
 from stickslip.web.projects import Item, written_whole
 from stickslip.web.rig_tasks import RIG_TASKS
 from stickslip.web.sent_tasks import SENT_TASKS
 from stickslip.web.worker import Said, plain
-from stickslip.whole_files import draft_of
 
 Request = Mapping[str, Any]
 LONG = 300_000
@@ -97,7 +97,7 @@ def planes(record: Any) -> list[dict[str, Any]]:
 
 def identify(request: Request, say: Said) -> dict[str, Any]:
     """Identify from the records of some logs; write model.toml, report.html and result.json."""
-    from stickslip.record import Record
+    from stickslip.core.record import Record
     from stickslip.verbs.identify import identify as run
 
     item = Item(Path(request["folder"]))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

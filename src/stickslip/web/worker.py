@@ -17,10 +17,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
-from stickslip.capacity import limit_memory
-from stickslip.config import confined_to
-from stickslip.errors import StickslipError
-from stickslip.messages import Surface, shown_on
+from stickslip.core.config import confined_to
+from stickslip.core.errors import StickslipError
+from stickslip.core.messages import Surface, shown_on
+from stickslip.core.resources import limit_memory
 
 Said = Callable[[dict[str, Any]], None]
 """Sends a line to the server."""

@@ -6,14 +6,14 @@ loop = {law = "NAME.py", kp = 5.0, ...} in the table [controller] of a TOML file
 
 `sample` is plain Python with numbers, `if`, `for i in range(n)` and functions of `math` (the scalar subset). It reads
 the loop's signals `y` and its parameters `p`, and writes its state `z` and local names alone. The signals with their
-units: help("stickslip.control_spec"); more in docs/howto/own_control_law.md in the source of the package.
+units: help("stickslip.core.control_spec"); more in docs/howto/own_control_law.md in the source of the package.
 """
 
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip import Par
+from stickslip.core.control_spec import ControlLaw
 
 
 class Params(NamedTuple):

@@ -5,14 +5,14 @@ law is named: ss.Model("NAME.py", fc=0.3, vt=1e-3), law = "NAME.py" in a TOML fi
 
 Functions are plain Python with numbers, `if`, `for i in range(n)` and functions of `math` (the scalar subset). A law
 reads its parameters, and writes its state `z` and local names alone. What every function is called with:
-help("stickslip.spec"); more, laws with memory too, in docs/howto/own_law.md and CONTRIBUTING.md in the source of the
-package.
+help("stickslip.core.spec"); more, laws with memory too, in docs/howto/own_law.md and CONTRIBUTING.md in the source of
+the package.
 """
 
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.spec import Law, Par
+from stickslip import Law, Par
 
 
 class Params(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw
+from stickslip.core.control_spec import ControlLaw
 
 
 class Params(NamedTuple):

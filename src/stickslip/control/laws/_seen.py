@@ -10,8 +10,8 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from stickslip.control.linear import Compensation
-from stickslip.control_spec import friction
-from stickslip.spec import Choice, Option, Par
+from stickslip.core.control_spec import friction
+from stickslip.core.spec import Choice, Option, Par
 
 MOST = 0.99 * math.pi
 """Largest corner times sample time that the low-pass is designed with."""

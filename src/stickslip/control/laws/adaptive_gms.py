@@ -15,8 +15,8 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.control.laws.dual_observer import VELOCITY
 from stickslip.control.laws.dual_observer import reference as velocity_of
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Kept, Learned, Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Kept, Learned, Par
 
 
 class Params(NamedTuple):

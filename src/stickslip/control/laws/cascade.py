@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Choice, Option, Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Choice, Option, Par
 
 
 class Params(NamedTuple):

@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import REST, ControlLaw
-from stickslip.spec import Choice, Option, Par
+from stickslip.core.control_spec import REST, ControlLaw
+from stickslip.core.spec import Choice, Option, Par
 
 MOST_DELAY = 2.0
 

@@ -16,10 +16,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Choice, Kept, Learned, Option, Par
 from stickslip.laws.sliding_curve import CURVE
 from stickslip.laws.sliding_curve import stribeck as sliding
-from stickslip.spec import Choice, Kept, Learned, Option, Par
 
 
 class Params(NamedTuple):

@@ -6,8 +6,8 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.control.laws._seen import LOW_PASS, OVER_SAMPLE, Seen, compensation, linear, open_pass
 from stickslip.control.linear import Compensation
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Choice, Option, Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Choice, Option, Par
 
 
 class Params(NamedTuple):

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw, friction
-from stickslip.spec import Kept, Learned, Par
+from stickslip.core.control_spec import ControlLaw, friction
+from stickslip.core.spec import Kept, Learned, Par
 
 
 class Params(NamedTuple):

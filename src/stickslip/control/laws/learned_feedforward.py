@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import REST, ControlLaw
-from stickslip.spec import Kept, Learned, Par
+from stickslip.core.control_spec import REST, ControlLaw
+from stickslip.core.spec import Kept, Learned, Par
 
 TURN = 2.0 * math.pi  # rad
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw, friction
-from stickslip.spec import Kept, Learned, Par
+from stickslip.core.control_spec import ControlLaw, friction
+from stickslip.core.spec import Kept, Learned, Par
 
 FULL = 0.999
 """Of the largest trace: a covariance that has been cut back tells nothing."""

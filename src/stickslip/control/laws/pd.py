@@ -6,8 +6,8 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.control.linear import Gains, place
 from stickslip.control.linear import pd as gains_of
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Par
 
 
 class Params(NamedTuple):

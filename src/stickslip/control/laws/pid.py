@@ -11,8 +11,8 @@ from typing import Annotated, Any, NamedTuple
 
 from stickslip.control.linear import Gains, place
 from stickslip.control.linear import pid as gains_of
-from stickslip.control_spec import REST, ControlLaw
-from stickslip.spec import Choice, Option, Par
+from stickslip.core.control_spec import REST, ControlLaw
+from stickslip.core.spec import Choice, Option, Par
 
 
 class Params(NamedTuple):

@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Choice, Option, Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Choice, Option, Par
 
 TURN = 2.0 * math.pi  # rad
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Kept, Learned, Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Kept, Learned, Par
 
 
 class Params(NamedTuple):

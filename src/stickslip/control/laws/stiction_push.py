@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Par
 
 
 class Params(NamedTuple):

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from stickslip.control_spec import ControlLaw
-from stickslip.spec import Choice, Option, Par
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.spec import Choice, Option, Par
 
 ROOT, INTEGRAL = 1.5, 1.1
 """Levant's gains: 1.5 sqrt(L) on the root, 1.1 L in the integral."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from stickslip.core.messages import name_option
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.alternatives.curve import octaves
-from stickslip.messages import name_option
 
 REMEDY = (
     f"identify friction per direction ({name_option('per_direction', True)}), or record both directions alike"

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import name_option
 from stickslip.identification.alternatives.alternative import Alternative, legendre
 from stickslip.identification.rows import SlidingRows
 from stickslip.identification.strokes import SlidingRecord
-from stickslip.messages import name_option
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

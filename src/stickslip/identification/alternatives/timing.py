@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import name_option
 from stickslip.identification.alternatives.alternative import Alternative
 from stickslip.identification.rows import SlidingRows
-from stickslip.messages import name_option
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
+from stickslip.core.record import Record
 from stickslip.identification.cogging.fitting import Fit, fit
 from stickslip.identification.cogging.moving import Motion, in_motion, speed_control
 from stickslip.identification.cogging.orders import (
@@ -41,9 +43,7 @@ from stickslip.identification.estimate import Identification, silent
 from stickslip.machines.angle import AngleMap
 from stickslip.machines.motor import Harmonics
 from stickslip.machines.position_map import PositionMap, Waves
-from stickslip.messages import name_option
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models.model import Model
 
 LEVELS = "fc", "sigma2"
 """Parameters of the model that stand among the estimates under another name."""

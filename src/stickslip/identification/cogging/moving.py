@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.record import Record
 from stickslip.identification.cogging.rows import FASTEST, velocity_of
 from stickslip.machines.position_map import PositionMap
-from stickslip.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]

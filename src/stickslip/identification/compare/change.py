@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.compare.levels import (
     Change,
     believed,

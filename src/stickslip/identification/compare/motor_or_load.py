@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_file, name_option
 from stickslip.identification.identified_file import Identified
-from stickslip.messages import name_file, name_option
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 
 def on_one_side(first: Identified, second: Identified) -> tuple[Identified, str]:

@@ -13,11 +13,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.arguments import arguments_checked
-from stickslip.errors import InputError, UnknownName
-from stickslip.finding import Finding, sorted_findings
-from stickslip.identification.memo import EstimateSliding
-from stickslip.identification.sliding import estimate_sliding
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.finding import Finding, sorted_findings
+from stickslip.core.record import Record
 from stickslip.identification.doctor import (
     by_profile,
     change,
@@ -33,8 +32,9 @@ from stickslip.identification.doctor import (
 )
 from stickslip.identification.doctor.steady_table import examine_table, is_steady_table
 from stickslip.identification.doctor.view import View
+from stickslip.identification.memo import EstimateSliding
+from stickslip.identification.sliding import estimate_sliding
 from stickslip.readers.cut import range_words, taken
-from stickslip.record import Record
 
 FINAL = ("too-short", "no-clock", "too-small")
 """Errors after which nothing can be computed."""

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns, name_option
 from stickslip.identification.doctor.view import View
-from stickslip.messages import name_columns, name_option
 
 MOTION, DRIVEN = ("position", "velocity", "time"), ("motor_torque", "current", "friction_torque")
 CONCERNS = {

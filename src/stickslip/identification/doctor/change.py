@@ -16,11 +16,11 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.finding import Finding
-from stickslip.identification.notes import drift_of
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_option
 from stickslip.identification.doctor.view import Array, Mask, Smooth, View, row
 from stickslip.identification.fit.profile import long_run
-from stickslip.messages import name_option
+from stickslip.identification.notes import drift_of
 
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns, name_option
+from stickslip.core.record import encoder_step
 from stickslip.identification.doctor.view import NEVER, View
-from stickslip.messages import name_columns, name_option
-from stickslip.record import encoder_step
 
 
 def channels(view: View) -> Iterator[Finding]:

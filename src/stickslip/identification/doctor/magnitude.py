@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_option
 from stickslip.identification.doctor.physics import line_of, usable
 from stickslip.identification.doctor.view import Smooth, View
-from stickslip.messages import name_option
 
 BOTH = 0.1
 """Share of the moving rows in either direction, and with either sign of the acceleration, that is motion both ways."""

@@ -14,11 +14,11 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_option, name_options
 from stickslip.identification.doctor.view import NEVER, Array, Smooth, View
 from stickslip.identification.fit.shifts import least_between, shifts_looked_at
 from stickslip.identification.fit.uncertainty import RATIO
-from stickslip.messages import name_option, name_options
 from stickslip.readers.convert import pendulum_before_gear
 
 ROWS = 20_000

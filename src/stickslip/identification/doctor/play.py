@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
+from stickslip.core.record import Record
 from stickslip.identification.doctor.physics import line_of, usable
 from stickslip.identification.doctor.view import Array, Smooth, View
-from stickslip.record import Record
 
 ROW = 1e-3
 """s of a row, for which what follows is counted in rows. Of 23 machines with play of another simulator, logged at 4

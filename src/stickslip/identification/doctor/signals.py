@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.finding import Finding, times
+from stickslip.core.finding import Finding, times
+from stickslip.core.messages import name_columns, name_option
+from stickslip.core.record import encoder_step
 from stickslip.identification.doctor.spikes import LATE, sticking_out
 from stickslip.identification.doctor.view import Array, Mask, View, is_number, row
-from stickslip.messages import name_columns, name_option
 from stickslip.readers.cut import FEWEST as PIECE
 from stickslip.readers.cut import RANGE, jumps
-from stickslip.record import encoder_step
 
 WINDOW = 0.1
 """s: the window over which a slow speed is told from the counts it gives."""

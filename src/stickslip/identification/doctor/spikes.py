@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_option
+from stickslip.core.record import Record
 from stickslip.identification.doctor.view import Array, View, row
-from stickslip.messages import name_option
 from stickslip.readers.cut import range_words
-from stickslip.record import Record
 
 DRIVING = ("motor_torque", "sensor_torque", "current", "voltage")
 """Channels that the axis follows with its acceleration."""

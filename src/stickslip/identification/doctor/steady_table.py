@@ -8,13 +8,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns, name_option
+from stickslip.core.record import Record
 from stickslip.identification.doctor import units
 from stickslip.identification.doctor.view import View, is_number
 from stickslip.identification.experiment import TORQUES
-from stickslip.messages import name_columns, name_option
 from stickslip.readers.cut import file_rows, range_words, taken
-from stickslip.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stickslip.finding import Finding, times
+from stickslip.core.finding import Finding, times
+from stickslip.core.messages import name_option
 from stickslip.identification.doctor.view import View, row
-from stickslip.messages import name_option
 
 GAP = 5.0
 """A gap is this many times the usual distance of samples."""

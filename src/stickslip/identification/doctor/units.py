@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
 from stickslip.identification.doctor.view import Array, View
 
 DEG, REV, RPM = math.pi / 180.0, 2.0 * math.pi, 2.0 * math.pi / 60.0

@@ -14,10 +14,10 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from stickslip.finding import Finding
+from stickslip.core.finding import Finding
+from stickslip.core.messages import name_columns, name_option
 from stickslip.identification.doctor.units import explained, in_counts
 from stickslip.identification.doctor.view import Array, View
-from stickslip.messages import name_columns, name_option
 
 LATE, EXPLAINS = 1.0, 0.5
 """Rows from which on a velocity is late: one that was differenced from row to row is half a row; and the share of its

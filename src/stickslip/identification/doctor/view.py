@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.identification.memo import EstimateSliding
-from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_columns
+from stickslip.core.record import Record, encoder_step
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.fit.filters import ZeroPhase, butterworth_poles
+from stickslip.identification.memo import EstimateSliding
+from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_columns
 from stickslip.readers.cut import file_rows
-from stickslip.record import Record, encoder_step
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Mask = np.ndarray[Any, np.dtype[np.bool_]]

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.errors import InputError, ParameterError
+from stickslip.core.spec import Field, Law
 from stickslip.identification.fit.levenberg_marquardt import Squares, descend
 from stickslip.identification.fit.parameter_vector import Vector
 from stickslip.identification.fit.sample_rate_limit import stiffness_at_rest
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.prescribed.steady import Steady
-from stickslip.spec import Field, Law
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -178,7 +178,7 @@ def level_of(law: Law, p: Any, velocity: float) -> float:
     if law.steady is not None:
         torque = abs(law.steady(3.0 * velocity, p))
     else:
-        from stickslip.spec import Surroundings
+        from stickslip.core.spec import Surroundings
 
         z = law.state(p)
         torque = 0.0

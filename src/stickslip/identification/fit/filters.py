@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.simulation.biquads import zero_phase
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

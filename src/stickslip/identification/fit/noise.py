@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.description import packed
-from stickslip.errors import InputError, UnknownName
-from stickslip.model import Model
-from stickslip.spec import Par
+from stickslip.core.description import packed
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.spec import Par
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.fit.levenberg_marquardt import Optimum, Squares, descend
 from stickslip.identification.fit.noise import Noise, quantile
 

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.spec import Law, Surroundings
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.experiment import Experiment
-from stickslip.spec import Law, Surroundings
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import axis_unit
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.fit.levenberg_marquardt import (
     STEP,
@@ -27,7 +28,6 @@ from stickslip.identification.fit.levenberg_marquardt import (
 from stickslip.identification.fit.noise import Noise, as_noise, noise_of_fit, quantile
 from stickslip.identification.fit.parameter_vector import Parameter, Vector
 from stickslip.identification.fit.profile import Profiles, inverse_root, long_run, profiles_of
-from stickslip.messages import axis_unit
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

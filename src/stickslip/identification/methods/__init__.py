@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from stickslip.errors import UnknownName
+from stickslip.core.errors import UnknownName
 
 if TYPE_CHECKING:
     from stickslip.identification.methods.method import Method

@@ -13,13 +13,13 @@ from operator import add
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.identification.rows import sliding_rows
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
+from stickslip.core.record import Record
 from stickslip.identification.experiment import TORQUES, Experiment
+from stickslip.identification.rows import sliding_rows
 from stickslip.identification.steady_friction.points import SlidingPoints
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_option
-from stickslip.record import Record
 
 APART = 3
 """Rows from point to point: half a window, beyond which the noise of neighbours hardly correlates."""

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 from stickslip.control.linear import Cascade, Gains
 from stickslip.control.own_loop import ReferenceVelocity, kind_of_loop, split_loop
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_columns, name_option
+from stickslip.core.record import Record
 from stickslip.identification.experiment import DRIVES, Experiment, experiment_of
 from stickslip.identification.methods._records import MOTORS, with_extra
 from stickslip.identification.methods.method import Options
 from stickslip.machines.servo import Motor, ServoAxis
-from stickslip.messages import name_columns, name_option
-from stickslip.record import Record
 from stickslip.simulation.recorded_input.simulation import Loop
 
 BESIDE_GAINS = ("limit", "filter", "period", "count", "span")

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from stickslip.core.record import Record
 from stickslip.identification.doctor.play import dead_travel
 from stickslip.identification.doctor.view import View
 from stickslip.identification.estimate import Estimate, Identification
 from stickslip.identification.experiment import Experiment
 from stickslip.machines.servo import ServoAxis
-from stickslip.record import Record
 
 HOLDS_ZERO = "its interval holds 0"
 

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from stickslip import plugins
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import name_columns, name_option, name_parameter
+from stickslip.core.record import Record
 from stickslip.identification.experiment import TORQUES
 from stickslip.identification.methods.method import Options
-from stickslip.messages import name_columns, name_option, name_parameter
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models import plugins
+from stickslip.models.model import Model
 
 MOTORS = ("torque_constant", "force_constant")
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_columns, name_option
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Identification
 from stickslip.identification.methods._records import has_torque, single, with_torque, without_constant_torque
 from stickslip.identification.methods.method import TORQUE, Method, Options
 from stickslip.identification.presliding.attraction import identify_attraction
 from stickslip.identification.presliding.hysteresis import Loop
-from stickslip.messages import name_columns, name_option
-from stickslip.record import Record
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:

@@ -5,25 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from stickslip.binding import NEGATIVE
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import name_option, name_parameter
+from stickslip.core.rebinding import NEGATIVE
+from stickslip.core.record import Record
 from stickslip.identification.axis import AUTOMATIC, identify_axis
+from stickslip.identification.estimate import Identification
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.fit.axis_start import frozen_by_default
 from stickslip.identification.memo import EstimateSliding
+from stickslip.identification.methods._experiments import driven, experiments_of
+from stickslip.identification.methods._play import with_dead_travel
+from stickslip.identification.methods.method import AXIS, Method, Options, law_of, refuse_unsaid
 from stickslip.identification.notes import against_given
 from stickslip.identification.output_error.over_angle import over_angle
 from stickslip.identification.output_error.plain import at_other_corners, inverse_identification
 from stickslip.identification.output_error.problem import mechanics_parameters
 from stickslip.identification.output_error.search import LEVELS, Extras, require_known
-from stickslip.identification.estimate import Identification
-from stickslip.identification.experiment import Experiment
-from stickslip.identification.fit.axis_start import frozen_by_default
-from stickslip.identification.methods._experiments import driven, experiments_of
-from stickslip.identification.methods._play import with_dead_travel
-from stickslip.identification.methods.method import AXIS, Method, Options, law_of, refuse_unsaid
 from stickslip.identification.regression.inverse import inverse_dynamics
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_option, name_parameter
-from stickslip.record import Record
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Identification
 from stickslip.identification.methods._records import has_torque, with_torque
 from stickslip.identification.methods.method import TORQUE, Method, Options
 from stickslip.identification.presliding.breakaway import identify_breakaway
-from stickslip.record import Record
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import name_columns, name_option, name_parameter
+from stickslip.core.record import Record
 from stickslip.identification.cogging import identify_cogging
 from stickslip.identification.estimate import Identification
 from stickslip.identification.experiment import TORQUES
 from stickslip.identification.methods._records import with_extra
 from stickslip.identification.methods.method import TORQUE, Method, Options
-from stickslip.messages import name_columns, name_option, name_parameter
-from stickslip.record import Record
 
 GEAR = "gear_ratio"
 

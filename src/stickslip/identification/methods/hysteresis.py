@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.errors import UnknownName
+from stickslip.core.errors import UnknownName
+from stickslip.core.messages import name_option
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Identification
 from stickslip.identification.methods._records import has_torque, single, with_torque
 from stickslip.identification.methods.method import TORQUE, Method, Options
 from stickslip.identification.presliding.hysteresis import Loop, choose_hysteresis, templates_for
-from stickslip.messages import name_option
-from stickslip.record import Record
 
 ROWS = 8000
 """Rows that a loop is fitted to: of 25,000 the same values come in a tenth of the time."""

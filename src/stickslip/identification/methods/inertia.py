@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from stickslip.analyse.split_runs import pieces
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Identification
 from stickslip.identification.methods._experiments import driven, experiments_of
 from stickslip.identification.methods.method import AXIS, Method, Options
 from stickslip.identification.response.inertia import inertia
-from stickslip.record import Record
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option, name_parameter
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Identification
 from stickslip.identification.methods._records import (
     has_torque,
@@ -15,8 +17,6 @@ from stickslip.identification.methods._records import (
 )
 from stickslip.identification.methods.method import TORQUE, Method, Options
 from stickslip.identification.presliding.lugre_dynamics import Response, identify_lugre_dynamics
-from stickslip.messages import name_option, name_parameter
-from stickslip.record import Record
 
 OWN = ("inertia", "offset")
 """Values that do not belong to the sliding curve."""

@@ -7,16 +7,16 @@ from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, fields
 from typing import Literal
 
-from stickslip import plugins
-from stickslip.binding import NEGATIVE
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option, name_parameter
+from stickslip.core.rebinding import NEGATIVE
+from stickslip.core.record import Record
+from stickslip.core.spec import Law
+from stickslip.identification.estimate import Identification, silent
 from stickslip.identification.memo import EstimateSliding
 from stickslip.identification.sliding import estimate_sliding
-from stickslip.identification.estimate import Identification, silent
-from stickslip.messages import name_option, name_parameter
-from stickslip.model import Model
-from stickslip.record import Record
-from stickslip.spec import Law
+from stickslip.models import plugins
+from stickslip.models.model import Model
 
 LONGEST_DELAY = 1.0
 """s"""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Identification
 from stickslip.identification.methods._records import (
     has_torque,
@@ -15,7 +16,6 @@ from stickslip.identification.methods._records import (
 from stickslip.identification.methods.method import TORQUE, Method, Options
 from stickslip.identification.presliding.hysteresis import Loop
 from stickslip.identification.presliding.presliding import identify_presliding
-from stickslip.record import Record
 
 OWN = ("inertia", "offset")
 """Values that do not belong to the sliding curve."""

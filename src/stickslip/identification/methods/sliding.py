@@ -1,5 +1,5 @@
-"""Fit a curve to the torques at constant velocities (`stickslip.identification.steady_friction.curve`), with one law chosen
-of several."""
+"""Fit a curve to the torques at constant velocities (`stickslip.identification.steady_friction.curve`), with one law
+chosen of several."""
 
 from __future__ import annotations
 
@@ -8,21 +8,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import name_option
+from stickslip.core.record import Record
+from stickslip.core.spec import Law
 from stickslip.identification.doctor.steady_table import NOTES, is_steady_table
 from stickslip.identification.estimate import Identification
 from stickslip.identification.fit.axis_start import each_way, frozen_by_default, starts
 from stickslip.identification.methods._coasting import coasting_points
 from stickslip.identification.methods._records import has_torque, with_torque
 from stickslip.identification.methods.method import TORQUE, Method, Options, law_of, refuse_unsaid
-from stickslip.identification.steady_friction.choice import candidates, choose_sliding, comparable, each_direction
+from stickslip.identification.steady_friction.choice import (
+    candidates,
+    choose_sliding,
+    comparable,
+    each_direction,
+)
 from stickslip.identification.steady_friction.curve import Array, identify_sliding
 from stickslip.identification.steady_friction.points import SlidingPoints
 from stickslip.identification.steady_friction.segments import sliding_points
-from stickslip.messages import name_option
-from stickslip.model import Model
-from stickslip.record import Record
-from stickslip.spec import Law
+from stickslip.models.model import Model
 
 FEW = "Coulomb with viscous friction was fitted: these points are too few to choose among several curves."
 PER_DIRECTION = (

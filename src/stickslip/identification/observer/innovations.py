@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.spec import Law
 from stickslip.identification.fit.axis_start import feasible
 from stickslip.identification.fit.broyden import Secants
 from stickslip.identification.fit.levenberg_marquardt import Optimum, Squares, descend
@@ -19,7 +20,6 @@ from stickslip.identification.fit.parallel import mapped
 from stickslip.identification.fit.parameter_vector import Vector
 from stickslip.identification.observer.observer import Prepared
 from stickslip.simulation.recorded_input.simulation import Mechanics
-from stickslip.spec import Law
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 MakeMechanics = Callable[[Mapping[str, float]], Mechanics]

@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Law
 from stickslip.identification.experiment import evenly_spaced
 from stickslip.identification.fit.filters import ZeroPhase, butterworth_poles
 from stickslip.identification.observer.encoder_edges import SeenVelocity, seen_velocity
 from stickslip.simulation.recorded_input.segments import Segments, cut
 from stickslip.simulation.recorded_input.simulation import Course, Drive, Mechanics
-from stickslip.spec import Law
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

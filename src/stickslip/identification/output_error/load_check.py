@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import name_option
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.regression.inverse import InverseDynamics
-from stickslip.messages import name_option
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -27,12 +27,12 @@ from typing import Any
 import numpy as np
 
 from stickslip.control.linear import Cascade, Gains
+from stickslip.core.messages import Note, name_option
+from stickslip.core.record import encoder_step
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.fit.jackknife import leave_blocks_out
 from stickslip.identification.fit.noise import white_std
 from stickslip.identification.fit.student import student_quantile
-from stickslip.messages import Note, name_option
-from stickslip.record import encoder_step
 from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

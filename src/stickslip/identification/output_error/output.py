@@ -8,6 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import axis_unit
+from stickslip.core.spec import Law
+from stickslip.identification.estimate import Estimate
+from stickslip.identification.experiment import Experiment
+from stickslip.identification.fit.axis_start import level_of
+from stickslip.identification.fit.uncertainty import Fit, fit
 from stickslip.identification.output_error.problem import Problem
 from stickslip.identification.output_error.search import (
     Asked,
@@ -17,14 +23,8 @@ from stickslip.identification.output_error.search import (
     errors_of,
     fitted_axis,
 )
-from stickslip.identification.estimate import Estimate
-from stickslip.identification.experiment import Experiment
-from stickslip.identification.fit.axis_start import level_of
-from stickslip.identification.fit.uncertainty import Fit, fit
 from stickslip.identification.regression.inverse import InverseDynamics, correlation_lags
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import axis_unit
-from stickslip.spec import Law
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -14,12 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.identification.memo import EstimateSliding
-from stickslip.identification.posterior import falls_of
-from stickslip.identification.search import Asked
-from stickslip.identification.sliding import SlidingPosterior
-from stickslip.identification.windows import POWER
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
 from stickslip.identification.cogging import angle_of, chosen_terms, map_of
 from stickslip.identification.cogging.fitting import Fit
 from stickslip.identification.cogging.orders import (
@@ -35,9 +31,13 @@ from stickslip.identification.cogging.result import ROUND, Choice, estimates_of,
 from stickslip.identification.cogging.rows import Places
 from stickslip.identification.estimate import Estimate, Identification, Picture
 from stickslip.identification.experiment import Experiment
+from stickslip.identification.memo import EstimateSliding
+from stickslip.identification.posterior import falls_of
+from stickslip.identification.search import Asked
+from stickslip.identification.sliding import SlidingPosterior
+from stickslip.identification.windows import POWER
 from stickslip.machines.position_map import PositionMap
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_option
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.identification.output_error.gravity import hanging
+from stickslip.core.errors import InputError
 from stickslip.identification.estimate import Estimate, Identification
 from stickslip.identification.experiment import Experiment
+from stickslip.identification.output_error.gravity import hanging
 from stickslip.identification.regression.force_error import plain_error_on
 from stickslip.identification.regression.inverse import InverseDynamics, inverse_dynamics
 from stickslip.machines.servo import ServoAxis
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.recorded_input.simulation import Mechanics
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Law, Par
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.fit.axis_start import feasible
 from stickslip.identification.fit.parameter_vector import Parameter, Vector
 from stickslip.machines.servo import ServoAxis
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.recorded_input.simulation import Course, Drive, Harmonics, Mechanics
-from stickslip.spec import Law, Par
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -14,21 +14,21 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError, UnknownName
-from stickslip.identification.output_error.gravity import hanging
-from stickslip.identification.output_error.load_check import tells_external
-from stickslip.identification.output_error.problem import Problem, measured, mechanics_parameters
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.messages import name_parameter
+from stickslip.core.spec import Law
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.fit.axis_start import frozen_by_default, starts
 from stickslip.identification.fit.broyden import descend_by_secants
 from stickslip.identification.fit.levenberg_marquardt import Squares
 from stickslip.identification.fit.parameter_vector import Parameter, Vector
+from stickslip.identification.output_error.gravity import hanging
+from stickslip.identification.output_error.load_check import tells_external
+from stickslip.identification.output_error.problem import Problem, measured, mechanics_parameters
 from stickslip.identification.regression.inverse import InverseDynamics, inverse_dynamics
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_parameter
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.recorded_input.simulation import Mechanics
-from stickslip.spec import Law
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

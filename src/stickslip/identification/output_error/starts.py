@@ -12,17 +12,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.identification.output_error.search import Asked, starting_models
+from stickslip.core.errors import InputError
+from stickslip.core.record import encoder_step
+from stickslip.core.spec import Law
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.fit.axis_start import steady_fits
 from stickslip.identification.observer.innovations import BAND
 from stickslip.identification.observer.observer import Motion
+from stickslip.identification.output_error.search import Asked, starting_models
 from stickslip.identification.regression.inverse import InverseDynamics, uniform
 from stickslip.machines.servo import ServoAxis
-from stickslip.model import Model
-from stickslip.record import encoder_step
-from stickslip.spec import Law
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -13,12 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import axis_unit
 from stickslip.identification.estimate import Identification, Picture, Trace
 from stickslip.identification.fit.noise import Noise, as_noise
-from stickslip.identification.presliding.hysteresis import Loop, correlation_lags, curve_of, fit_loop, loop_misfit
-from stickslip.messages import axis_unit
-from stickslip.model import Model
+from stickslip.identification.presliding.hysteresis import (
+    Loop,
+    correlation_lags,
+    curve_of,
+    fit_loop,
+    loop_misfit,
+)
+from stickslip.models.model import Model
 from stickslip.simulation.prescribed.motion import Along
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

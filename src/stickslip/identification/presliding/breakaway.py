@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import axis_unit, name_option
+from stickslip.core.record import Record, encoder_step
 from stickslip.identification.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identification.fit.student import student_quantile
 from stickslip.identification.steady_friction.levels import slope_of
-from stickslip.messages import axis_unit, name_option
-from stickslip.record import Record, encoder_step
 
 WINDOW = 0.02
 """s, over which a velocity is taken where the record has none."""

@@ -14,16 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.errors import InputError, ParameterError
+from stickslip.core.messages import axis_unit
+from stickslip.core.record import Record
+from stickslip.core.spec import Law, Par
 from stickslip.identification.estimate import Identification, Picture, Trace
 from stickslip.identification.fit.noise import Noise
 from stickslip.identification.fit.parameter_vector import Parameter, Vector
 from stickslip.identification.fit.uncertainty import Fit, fit
-from stickslip.messages import axis_unit
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.models.model import Model
 from stickslip.simulation.prescribed.motion import Along
-from stickslip.spec import Law, Par
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]

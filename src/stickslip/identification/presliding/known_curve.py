@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip import plugins
-from stickslip.binding import NEGATIVE
-from stickslip.errors import InputError
-from stickslip.friction_levels import end_of_slope, levels_of, static_level
-from stickslip.messages import name_option
-from stickslip.model import Model
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_option
+from stickslip.core.rebinding import NEGATIVE
+from stickslip.models import plugins
+from stickslip.models.friction_levels import end_of_slope, levels_of, static_level
+from stickslip.models.model import Model
 
 SLIDING = ("curve", "viscous", "symmetry", "position_dependence")
 """Choices of a law that belong to sliding, and that a record of position and torque can follow."""

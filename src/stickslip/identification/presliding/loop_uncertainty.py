@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import axis_unit
+from stickslip.core.record import encoder_step
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.fit.noise import quantile
 from stickslip.identification.fit.profile import inverse_information
 from stickslip.identification.fit.student import student_quantile
 from stickslip.identification.fit.uncertainty import RATIO, SHARE, Fit
 from stickslip.identification.presliding.hysteresis import Loop, Rows, correlation_lags, fit_loop
-from stickslip.messages import axis_unit
-from stickslip.record import encoder_step
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

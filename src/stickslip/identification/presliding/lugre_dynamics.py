@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
-from stickslip.errors import InputError
-from stickslip.friction_levels import levels_of
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Estimate, Identification
 from stickslip.identification.fit.broyden import descend_by_secants
 from stickslip.identification.fit.levenberg_marquardt import Residuals, Squares
@@ -29,9 +29,14 @@ from stickslip.identification.fit.parameter_vector import Vector
 from stickslip.identification.fit.uncertainty import Fit, fit
 from stickslip.identification.presliding.hysteresis import correlation_lags
 from stickslip.identification.presliding.known_curve import describe_unused, static_levels, transfer_curve
-from stickslip.identification.presliding.lugre_scan import plain_scan, plain_verdict, response_picture, scan_picture
-from stickslip.model import Model
-from stickslip.record import Record
+from stickslip.identification.presliding.lugre_scan import (
+    plain_scan,
+    plain_verdict,
+    response_picture,
+    scan_picture,
+)
+from stickslip.models.friction_levels import levels_of
+from stickslip.models.model import Model
 from stickslip.simulation.recorded_input.simulation import Course, Drive, Mechanics
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import axis_unit
 from stickslip.identification.estimate import Picture, Trace
 from stickslip.identification.fit.uncertainty import Fit
-from stickslip.messages import axis_unit
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.estimate import Identification
 from stickslip.identification.fit.noise import Noise, as_noise
 from stickslip.identification.fit.parameter_vector import Vector
@@ -35,7 +35,7 @@ from stickslip.identification.presliding.hysteresis import (
 )
 from stickslip.identification.presliding.known_curve import describe_unused, static_levels, transfer_curve
 from stickslip.identification.presliding.loop_uncertainty import add_systematic_errors
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.prescribed.motion import Along
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.experiment import Experiment
 from stickslip.identification.regression.inverse import InverseDynamics, inverse_dynamics
 from stickslip.machines.servo import ServoAxis
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import name_frozen, name_option
 from stickslip.identification.experiment import Experiment, evenly_spaced, insist_on_motion
 from stickslip.identification.fit.filters import decimated, low_pass, spectrum
 from stickslip.identification.fit.profile import inverse_information, long_run
 from stickslip.machines.servo import ServoAxis
-from stickslip.messages import name_frozen, name_option
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

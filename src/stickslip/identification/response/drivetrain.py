@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identification.fit.filters import cross_spectrum, spectrum
 from stickslip.machines.drivetrain import Drivetrain, LinearContact
 from stickslip.machines.two_mass import TwoMassAxis
-from stickslip.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]

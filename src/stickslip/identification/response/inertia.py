@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identification.experiment import Experiment, insist_on_motion
 from stickslip.identification.fit.filters import cross_spectrum, spectrum

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.response.drivetrain import LoopResponse
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

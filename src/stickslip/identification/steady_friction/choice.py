@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.binding import NEGATIVE
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import axis_unit
+from stickslip.core.rebinding import NEGATIVE
 from stickslip.identification.estimate import Identification, silent
 from stickslip.identification.fit.noise import Noise
 from stickslip.identification.fit.selection import Indices, criteria, cross_validate
@@ -22,8 +23,7 @@ from stickslip.identification.steady_friction.curve import (
     model_of,
 )
 from stickslip.identification.steady_friction.torques import Torques, steady_vector
-from stickslip.messages import axis_unit
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError, ParameterError
+from stickslip.core.errors import InputError, ParameterError
+from stickslip.core.messages import axis_unit
 from stickslip.identification.estimate import Identification
 from stickslip.identification.evidence import bend_limits, bounded_verdicts, within_speeds
 from stickslip.identification.fit.multistart import separable_starts
@@ -23,11 +24,14 @@ from stickslip.identification.fit.parameter_vector import Vector
 from stickslip.identification.fit.selection import criteria
 from stickslip.identification.fit.uncertainty import Fit, fit
 from stickslip.identification.steady_friction.curve_pictures import curve_picture, listed, residual_picture
-from stickslip.identification.steady_friction.offset import apart_from_friction, details_of, with_unknown_offset
+from stickslip.identification.steady_friction.offset import (
+    apart_from_friction,
+    details_of,
+    with_unknown_offset,
+)
 from stickslip.identification.steady_friction.points import SlidingPoints
 from stickslip.identification.steady_friction.torques import Torques, steady_vector, tied_to_offset, vector_of
-from stickslip.messages import axis_unit
-from stickslip.model import Model
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

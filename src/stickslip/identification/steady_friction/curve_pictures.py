@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import axis_unit
 from stickslip.identification.estimate import Picture, Trace
 from stickslip.identification.fit.uncertainty import Fit
 from stickslip.identification.steady_friction.points import SlidingPoints
 from stickslip.identification.steady_friction.torques import Torques
-from stickslip.messages import axis_unit
 
 FAMILY = 40
 """How many of the equally good curves are drawn."""

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.record import encoder_step
 from stickslip.identification.fit.noise import white_std
-from stickslip.record import encoder_step
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.messages import axis_unit, name_frozen
 from stickslip.identification.estimate import Estimate
 from stickslip.identification.fit.uncertainty import Fit
 from stickslip.identification.steady_friction.points import SlidingPoints
 from stickslip.identification.steady_friction.torques import OFFSET
-from stickslip.messages import axis_unit, name_frozen
 
 LEVEL = f"or give {name_frozen('offset', 0)} if nothing but friction acts (a level axis)"
 BOTH = f"move in both directions, {LEVEL}"

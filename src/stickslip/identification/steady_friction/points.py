@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 from stickslip.identification.fit.selection import Indices
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

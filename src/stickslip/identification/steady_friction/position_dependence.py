@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.identification.estimate import Estimate, Identification, Picture, Trace
 from stickslip.identification.steady_friction.segments import Segment, constant_velocity_segments
 from stickslip.machines.angle import AngleMap, harmonic_sum
 from stickslip.machines.motor import Harmonics
-from stickslip.record import Record
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.messages import axis_unit, name_option
+from stickslip.core.record import Record, encoder_step
 from stickslip.identification.steady_friction.levels import Level, find_levels, level_runs, slope_of
 from stickslip.identification.steady_friction.points import SlidingPoints
-from stickslip.messages import axis_unit, name_option
-from stickslip.record import Record, encoder_step
 from stickslip.rigs.procedures.resting import RESTING, resting
 
 __all__ = ["Dropped", "Segment", "constant_velocity_segments", "segments_of", "sliding_points", "slope_of"]

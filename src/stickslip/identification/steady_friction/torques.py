@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.spec import Par
 from stickslip.identification.fit.parameter_vector import Parameter, Vector
 from stickslip.identification.steady_friction.points import SlidingPoints
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.prescribed.steady import Steady
-from stickslip.spec import Par
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from stickslip.errors import UnknownName
+from stickslip.core.errors import UnknownName
 
 if TYPE_CHECKING:
     from stickslip.rigs.procedures.base import Procedure

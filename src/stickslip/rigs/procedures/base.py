@@ -17,10 +17,10 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from stickslip.capacity import insist_on_memory
 from stickslip.control.controller import Controller
-from stickslip.errors import InputError, RigError, suggestion
-from stickslip.record import Record
+from stickslip.core.errors import InputError, RigError, suggestion
+from stickslip.core.record import Record
+from stickslip.core.resources import insist_on_memory
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.loop_sample import COLUMNS, UNITS, begin_learned, end_learned
 from stickslip.rigs.realtime import Account
@@ -261,8 +261,8 @@ def perform(
     procedure : Procedure
     rig : Rig
     path : path, optional
-        File to which every sample is written immediately (`stickslip.stream`). Without it a virtual rig's unrecorded
-        samples are discarded after each step, so long runs need little memory.
+        File to which every sample is written immediately (`stickslip.core.stream`). Without it a virtual rig's
+        unrecorded samples are discarded after each step, so long runs need little memory.
     progress : callable, optional
         Called with the label of every labelled step.
     without_watchdog, realtime

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.procedures.moves import ROOM, holder, move, now, samples
 from stickslip.rigs.rig import Rig, setpoints

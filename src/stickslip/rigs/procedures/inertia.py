@@ -20,8 +20,8 @@ import numpy as np
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import Gains
-from stickslip.errors import InputError, RigError
-from stickslip.record import Record
+from stickslip.core.errors import InputError, RigError
+from stickslip.core.record import Record
 from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.procedures.moves import (

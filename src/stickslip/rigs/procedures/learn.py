@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from stickslip.config import read_toml
 from stickslip.control.block import ControlBlock
 from stickslip.control.controller import Controller
 from stickslip.control.learned import refuse_others, write_table
@@ -17,15 +16,16 @@ from stickslip.control.learning import AngleTable, TimeTable, low_pass
 from stickslip.control.position import position_feedforward
 from stickslip.control.sample_time import sampled_by
 from stickslip.control.written import tables_of
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.config import read_toml
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.record import Record
+from stickslip.core.spec import Surroundings
 from stickslip.machines.position_map import PositionMap
-from stickslip.record import Record
 from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Step, Steps
 from stickslip.rigs.procedures.track import Track, machine_in
 from stickslip.rigs.rig import Rig, setpoints
 from stickslip.simulation.compiled_controller import FEEDFORWARD, compiled, replay
-from stickslip.spec import Surroundings
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TORQUE = COLUMNS.index("torque_command")

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.capacity import number_of
 from stickslip.control.controller import Controller
 from stickslip.control.linear import place
-from stickslip.errors import RigError
+from stickslip.core.errors import RigError
+from stickslip.core.resources import number_of
 from stickslip.rigs.procedures.base import BYTES, POSITION, Step
 from stickslip.rigs.rig import Rig, setpoints
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 from stickslip.rigs.procedures.base import Check, Plan, Steps
 from stickslip.rigs.procedures.track import Track
 from stickslip.rigs.rig import Rig

@@ -12,8 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.record import Record
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.rigs.loop_sample import COLUMNS
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.procedures.moves import ROOM, brake, holder, now, samples, speed_up

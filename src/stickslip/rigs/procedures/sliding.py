@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stickslip.record import Record, encoder_step
+from stickslip.core.record import Record, encoder_step
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.procedures.moves import ROOM, brake, holder, now, uniform
 from stickslip.rigs.procedures.resting import RESTING, resting

@@ -13,8 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from stickslip.errors import InputError
-from stickslip.record import Record
+from stickslip.core.errors import InputError
+from stickslip.core.record import Record
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.procedures.moves import ROOM, holder, now, samples, smooth
 from stickslip.rigs.rig import Rig, setpoints

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stickslip.record import Record
+from stickslip.core.record import Record
 from stickslip.rigs.procedures.base import Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.procedures.moves import now, samples
 from stickslip.rigs.rig import Rig, setpoints

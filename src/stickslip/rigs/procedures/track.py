@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from stickslip.config import read_toml
 from stickslip.control import catalogue
 from stickslip.control.belief import believed
 from stickslip.control.compensator import COMPENSATORS
@@ -20,10 +19,11 @@ from stickslip.control.files import read_controller
 from stickslip.control.learned import read_learned, told, write_learned
 from stickslip.control.linear import LINEAR, Gains, place
 from stickslip.control.recommended import read_recommended
-from stickslip.errors import InputError, UnknownName
+from stickslip.core.config import read_toml
+from stickslip.core.errors import InputError, UnknownName
+from stickslip.core.record import Record
 from stickslip.machines.angle import AngleMap
-from stickslip.model import Model, Reference
-from stickslip.record import Record
+from stickslip.models.model import Model, Reference
 from stickslip.rigs.procedures.base import POSITION, Check, Plan, Procedure, Step, Steps
 from stickslip.rigs.procedures.moves import ROOM, samples
 from stickslip.rigs.rig import Rig, setpoints

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.progress import Reached, watched
 from stickslip.jit import kernel, pointer
 from stickslip.simulation._meter import MAX_WINDOW, close_standstill, meter, new_meter, turning_points
 from stickslip.simulation._nodes import SIGNALS
@@ -46,7 +47,6 @@ from stickslip.simulation.case_arrays import (
     StepBudget,
 )
 from stickslip.simulation.metrics import settle_band_of
-from stickslip.waiting import Reached, watched
 
 EVENT_ROWS = 20_000
 CREEP, STEEPEST = 1e-9, 1e6

@@ -24,6 +24,8 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.progress import Reached, watched
+from stickslip.core.spec import Bristle, Elements, Law, Option
 from stickslip.jit import flat
 from stickslip.simulation._forcing import NO_CELLS, feedforward
 from stickslip.simulation._meter import SIZE, close_standstill, new_meter
@@ -49,8 +51,6 @@ from stickslip.simulation.exact import state as col
 from stickslip.simulation.exact.kernel import LONGEST_STEP, solve
 from stickslip.simulation.exact.state import AT_NOW, AT_SIDES, Laid, Output
 from stickslip.simulation.metrics import settle_band_of
-from stickslip.spec import Bristle, Elements, Law, Option
-from stickslip.waiting import Reached, watched
 
 EVENT_ROWS = 20_000
 STEPS = StepBudget(1_000_000, 300_000, 1_000, 50_000_000)

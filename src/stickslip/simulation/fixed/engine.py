@@ -16,9 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import ParameterError
-from stickslip.friction_levels import static_level
+from stickslip.core.errors import ParameterError
+from stickslip.core.progress import Reached, watched
+from stickslip.core.spec import Surroundings
 from stickslip.jit import kernel, pointer
+from stickslip.models.friction_levels import static_level
 from stickslip.simulation._meter import close_standstill, new_meter, turning_points
 from stickslip.simulation.case_arrays import (
     COLUMNS,
@@ -58,8 +60,6 @@ from stickslip.simulation.fixed.step import GROWTH, LANDING, advance
 from stickslip.simulation.metrics import settle_band_of
 from stickslip.simulation.root import ROOT
 from stickslip.simulation.root import compiled as root
-from stickslip.spec import Surroundings
-from stickslip.waiting import Reached, watched
 
 RESOLVED = 2.0
 """dt * slope / J up to which the trapezoid runs; omega dt = 2 after `contact_slope` of a spring."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.spec import Surroundings
 from stickslip.jit import compiled_law, flat, kernel
 from stickslip.machines.drivetrain import INPUTS, Flow, StateSpace
 from stickslip.machines.machine import Machine
@@ -38,7 +39,6 @@ from stickslip.simulation.machine.step import measure, sample
 from stickslip.simulation.root import ROOT
 from stickslip.simulation.root import compiled as root
 from stickslip.simulation.train.layout import NO_TRAIN, SHARE, halvings, lay_out_train, stand_train
-from stickslip.spec import Surroundings
 
 __all__ = ["CHANNELS", "Laid", "lay_out_machine", "look", "run", "stand_at", "wait"]
 

@@ -18,12 +18,13 @@ import stickslip
 from stickslip.control.controller import Controller
 from stickslip.control.learned import after
 from stickslip.control.sample_time import sampled_by
-from stickslip.errors import Divergence, InputError
+from stickslip.core.errors import Divergence, InputError
+from stickslip.core.record import Record
+from stickslip.core.spec import Surroundings
+from stickslip.core.type_rules import is_number
 from stickslip.jit import compiled_profile, flat
 from stickslip.machines.machine import Machine
-from stickslip.model import Reference
-from stickslip.record import Record
-from stickslip.rules import is_number
+from stickslip.models.model import Reference
 from stickslip.simulation._meter import new_meter, turning_points
 from stickslip.simulation._nodes import SIGNALS
 from stickslip.simulation.case_arrays import DIVERGED, ruled, ruled_in, slip_rules
@@ -44,7 +45,6 @@ from stickslip.simulation.machine.plant import FINEST
 from stickslip.simulation.metrics import metrics, settle_band_of
 from stickslip.simulation.no_torque import no_torque
 from stickslip.simulation.train.layout import cannot_locate
-from stickslip.spec import Surroundings
 from stickslip.subset import Layout
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError, ParameterError, UnknownName
+from stickslip.core.errors import InputError, ParameterError, UnknownName
 from stickslip.simulation import _meter, case_arrays
 from stickslip.simulation._meter import LONG_WINDOW, MAX_WINDOW
 from stickslip.simulation.case_arrays import (

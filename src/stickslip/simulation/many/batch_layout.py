@@ -15,13 +15,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip.binding import bound
-from stickslip.errors import ParameterError, UnknownName
+from stickslip.core.errors import ParameterError, UnknownName
+from stickslip.core.rebinding import bound
+from stickslip.core.spec import Bristle, Elements, Field, Law
 from stickslip.simulation.case_arrays import Array, Side
 from stickslip.simulation.exact import state as col
 from stickslip.simulation.exact.engine import CURVE_SPEEDS, curve_of
 from stickslip.simulation.many.batch_kernel import curve_at, layers, least_of
-from stickslip.spec import Bristle, Elements, Field, Law
 
 
 @dataclass(frozen=True)

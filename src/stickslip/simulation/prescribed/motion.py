@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
+from stickslip.core.spec import Law, Surroundings
 from stickslip.jit import call_step, compiled_law, flat, kernel, pointer
-from stickslip.model import Model
-from stickslip.spec import Law, Surroundings
+from stickslip.models.model import Model
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

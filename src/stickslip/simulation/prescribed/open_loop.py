@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.arguments import arguments_checked
-from stickslip.errors import InputError, StepFailure, UnknownName
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.errors import InputError, StepFailure, UnknownName
+from stickslip.core.record import Record
+from stickslip.core.reprs import Vector
+from stickslip.core.spec import Surroundings
 from stickslip.jit import compiled_profile, flat
-from stickslip.model import Model, Reference
-from stickslip.record import Record
+from stickslip.models.model import Model, Reference
 from stickslip.simulation.case_arrays import Side, ruled, slip_rules
 from stickslip.simulation.prescribed.kernels import Motion, march
-from stickslip.spec import Surroundings
 from stickslip.subset import Layout
-from stickslip.values import Vector
 
 METHODS = ("auto", "step", "rate")
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.spec import Law
 from stickslip.jit import LawPointers, call_value, compiled_law, flat, kernel, pointer
-from stickslip.spec import Law
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

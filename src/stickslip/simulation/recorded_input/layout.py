@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.core.spec import Surroundings
 from stickslip.jit import LawPointers, pointer, record_at, spliced
 from stickslip.simulation.case_arrays import AROUND
 from stickslip.simulation.recorded_input.contact import AXIS, Plant
 from stickslip.simulation.recorded_input.step import MOVING
 from stickslip.simulation.root import SEARCH
-from stickslip.spec import Surroundings
 
 DRIVE = np.dtype(
     [

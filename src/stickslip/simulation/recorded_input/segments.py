@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip.core.spec import Law, Surroundings
 from stickslip.jit import compiled_lanes, flat
 from stickslip.simulation import root
 from stickslip.simulation.recorded_input import simd_batch
@@ -27,7 +28,6 @@ from stickslip.simulation.recorded_input.simd_batch import Numbers
 from stickslip.simulation.recorded_input.simulation import Drive, Mechanics, reads_load
 from stickslip.simulation.recorded_input.step import LEAST
 from stickslip.simulation.root import ROOT
-from stickslip.spec import Law, Surroundings
 from stickslip.subset import law_layouts, lower
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

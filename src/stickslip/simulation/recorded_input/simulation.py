@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError, ParameterError, UnknownName
+from stickslip.core.errors import InputError, ParameterError, UnknownName
+from stickslip.core.spec import Law, Surroundings
 from stickslip.jit import compiled_law, flat
-from stickslip.model import Model
+from stickslip.models.model import Model
 from stickslip.simulation.recorded_input import loop
 from stickslip.simulation.recorded_input.contact import AXIS
 from stickslip.simulation.recorded_input.layout import DRIVE, MOVED, SAMPLE, laid_out
-from stickslip.spec import Law, Surroundings
 from stickslip.subset import law_layouts, lower
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.core.spec import Bristle, Elements
 from stickslip.machines.drivetrain import exponential
 from stickslip.simulation.case_arrays import (
     INERTIA,
@@ -51,7 +52,6 @@ from stickslip.simulation.sampled.rates import (
     STEPS,
     STUCK,
 )
-from stickslip.spec import Bristle, Elements
 
 LOCAL = 1e-3
 """Of the tolerance, which one step may be wrong by."""

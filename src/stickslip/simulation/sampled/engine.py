@@ -3,7 +3,7 @@
 Between two samples the torque does not change, so that the motion is that of the contact alone: exact while every
 element sticks (`sampled.stick`), of order 8 under error control while something slips (`sampled.slip`), and cut where
 an element breaks away or the axis turns (`sampled.modes`). That is for laws that give `modes`
-(`stickslip.spec.Elements`, `Bristle`); every other law takes implicit steps under error control
+(`stickslip.core.spec.Elements`, `Bristle`); every other law takes implicit steps under error control
 (`sampled.general`). The tolerance is, as that of the other integrators, the error in position that a well-conditioned
 run may gather; general steps, of second order, gather more where a contact's spring rings at rest.
 
@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.core.progress import Reached, watched
 from stickslip.jit import call_profile, call_sample, kernel, pointer
 from stickslip.simulation._meter import close_standstill, new_meter, turning_points
 from stickslip.simulation.case_arrays import (
@@ -58,7 +59,6 @@ from stickslip.simulation.sampled.rates import HOLDS, RESTS, SLIPS, STEPS, STUCK
 from stickslip.simulation.sampled.rush import RUNAWAY, rush
 from stickslip.simulation.sampled.slip import slip
 from stickslip.simulation.sampled.stick import stick
-from stickslip.waiting import Reached, watched
 
 MOST_STEPS = 5e7
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from stickslip.core.spec import Elements
 from stickslip.jit import WIDTH, kernel, pointer
 from stickslip.machines.drivetrain import INPUTS, StateSpace
 from stickslip.machines.machine import Machine
@@ -32,7 +33,6 @@ from stickslip.simulation.train.records import (
     train_of,
 )
 from stickslip.simulation.train.shapes import PARTS, tables
-from stickslip.spec import Elements
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

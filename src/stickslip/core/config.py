@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self, cast
 
-from stickslip.errors import ConfigError, InputError, ModelRemark, refuse_nul, suggestion
-from stickslip.messages import name_file
+from stickslip.core.errors import ConfigError, InputError, ModelRemark, refuse_nul, suggestion
+from stickslip.core.messages import name_file
 
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 SHOWN = 5

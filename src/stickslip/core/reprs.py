@@ -9,7 +9,7 @@ from typing import Annotated, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from stickslip.rules import NUMBERS
+from stickslip.core.type_rules import NUMBERS
 
 Vector = Annotated[ArrayLike, NUMBERS]
 """An array, a list, a data frame's column, ..., of numbers: an annotation that type checkers take for `ArrayLike`."""

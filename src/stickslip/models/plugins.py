@@ -21,11 +21,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
 
-from stickslip import approval, trial
-from stickslip.arguments import arguments_checked
-from stickslip.errors import InputError, LawError, UnknownName, suggestion
-from stickslip.origin import TEXT
-from stickslip.spec import COMPILED, Law, ReferenceKind
+from stickslip.core import code_approval, smoke_test
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.errors import InputError, LawError, UnknownName, suggestion
+from stickslip.core.pickling import TEXT
+from stickslip.core.spec import COMPILED, Law, ReferenceKind
 from stickslip.subset import law_layouts, lower
 
 P = ParamSpec("P")
@@ -61,7 +61,7 @@ def law(name: str, named_by: str = "") -> Law:
     name : str
     named_by : str
         The file and key where the name stands; empty where the user himself names it. Code named by a file runs only
-        if it is allowed (`stickslip.approval`).
+        if it is allowed (`stickslip.core.code_approval`).
 
     Raises
     ------
@@ -167,7 +167,7 @@ def _without_options(path: str, code: bytes) -> Law:
 def _tried(law: Law, origin: str) -> Law:
     """A law from outside, with the choices that any law has: read in the scalar subset, and tried for some steps."""
     lower({n: getattr(law, n) for n in COMPILED if getattr(law, n)}, law_layouts(law))
-    if wrong := trial.complaint(law):
+    if wrong := smoke_test.complaint(law):
         raise LawError(f"{origin}: law {law.name!r}: {wrong}; correct it (`stickslip law FILE.py --check`)")
     return completed(law)
 
@@ -181,9 +181,9 @@ def code_at(path: str, named_by: str = "") -> tuple[str, bytes]:
     except OSError as error:
         raise LawError(f"{path} cannot be read ({error.strerror}); give the path of the law's file") from None
     if named_by:
-        approval.demand(path, code, named_by)
+        code_approval.demand(path, code, named_by)
     else:
-        approval.asked_for(path, code)
+        code_approval.asked_for(path, code)
     return path, code
 
 

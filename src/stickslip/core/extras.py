@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 
 def needed(module: str, extra: str, what: str) -> Any:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
-from stickslip.messages import render
+from stickslip.core.messages import render
 
 Level = Literal["error", "warning", "note"]
 

@@ -23,9 +23,9 @@ Argument order, everywhere: signals of the loop ``y``, state ``z``, parameters `
 =======================================  ===========================================================
 
 ``sample``, ``take_over``, ``accelerating`` and ``deviations`` are written in the scalar subset (`stickslip.subset`).
-``y`` has the fields of `Signals`, ``u`` those of `stickslip.spec.Surroundings`. A law that holds a friction law calls
-``friction(v0, v1, dt, z.friction, p.friction, u)``, and ``friction_steady(v, p.friction)`` for its torque at constant
-velocity.
+``y`` has the fields of `Signals`, ``u`` those of `stickslip.core.spec.Surroundings`. A law that holds a friction law
+calls ``friction(v0, v1, dt, z.friction, p.friction, u)``, and ``friction_steady(v, p.friction)`` for its torque at
+constant velocity.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from dataclasses import dataclass, field
 from dataclasses import fields as dataclass_fields
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from stickslip.arguments import constructor_named, insist_on_own
-from stickslip.binding import bound, first_complaint
-from stickslip.errors import LawError
-from stickslip.spec import Choice, Configurable, Field, Law, Par, fields_of
+from stickslip.core.arguments import constructor_named, insist_on_own
+from stickslip.core.errors import LawError
+from stickslip.core.rebinding import bound, first_complaint
+from stickslip.core.spec import Choice, Configurable, Field, Law, Par, fields_of
 
 PLACES = ("estimator", "feedforward", "observer", "loop")
 """Where a law stands in a controller, in the order in which a sample runs them."""
@@ -92,7 +92,7 @@ def friction_steady(v: float, p: Any) -> float:
 @constructor_named
 @dataclass(frozen=True, eq=False, repr=False)
 class ControlLaw(Configurable):
-    """A control law (``help("stickslip.control_spec")`` has its functions and their arguments).
+    """A control law (``help("stickslip.core.control_spec")`` has its functions and their arguments).
 
     ``stickslip law --template control`` prints a complete file of one, ``help(stickslip.ControlBlock)`` a short one.
 

@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip._stream_file import MAGIC, StreamFile, contents, rows_since
-from stickslip.errors import InputError, RecordFault
-from stickslip.record import Record
+from stickslip.core._stream_file import MAGIC, StreamFile, contents, rows_since
+from stickslip.core.errors import InputError, RecordFault
+from stickslip.core.record import Record
 
 __all__ = ["EXTENT", "MAGIC", "PERIOD", "Stream", "rows_since"]
 
@@ -50,7 +50,7 @@ class Stream:
     path : path or None
         The file, which must not exist yet; None keeps the rows in memory.
     meta : mapping
-        As `stickslip.record.Record`'s.
+        As `stickslip.core.record.Record`'s.
     absent : sequence of str
         Columns that nothing is measured for: they are left out of the record.
     paced : bool

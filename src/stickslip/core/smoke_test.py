@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-from stickslip.spec import Law, Surroundings
+from stickslip.core.spec import Law, Surroundings
 
 STEPS = 150
 NOW = 1e-6

@@ -1,7 +1,7 @@
 """Arguments of a wild kind are refused where they are given: one line with function, argument, value and remedy.
 
-Annotations say what an argument must be (`stickslip.rules`): what is no number, text such as "0.1" above all, no text,
-path, function, list or mapping, no `Model`, or none of the words of a ``Literal`` does not get in.
+Annotations say what an argument must be (`stickslip.core.type_rules`): what is no number, text such as "0.1" above all,
+no text, path, function, list or mapping, no `Model`, or none of the words of a ``Literal`` does not get in.
 """
 
 from __future__ import annotations
@@ -15,9 +15,17 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import chain, repeat
 from typing import Any, ParamSpec, TypeVar, cast
 
-from stickslip.errors import BEYOND, InputError, ParameterError, StickslipError, UnknownName, beyond, one_line
-from stickslip.messages import SIGNALS, render
-from stickslip.rules import Rule, Wrong, rule_of
+from stickslip.core.errors import (
+    BEYOND,
+    InputError,
+    ParameterError,
+    StickslipError,
+    UnknownName,
+    beyond,
+    one_line,
+)
+from stickslip.core.messages import SIGNALS, render
+from stickslip.core.type_rules import Rule, Wrong, rule_of
 
 EXAMPLES = {
     "initial": "(0.0, 0.0), position (rad) and velocity (rad/s)",

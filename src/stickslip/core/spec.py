@@ -42,10 +42,9 @@ from dataclasses import dataclass, field
 from dataclasses import fields as dataclass_fields
 from typing import Any, ClassVar
 
-from stickslip.arguments import constructor_named, insist_on_own
-from stickslip.binding import bound, distinct, first_complaint, least, wrapped
-from stickslip.configurable import Configurable, Described
-from stickslip.description import (
+from stickslip.core.arguments import constructor_named, insist_on_own
+from stickslip.core.configurable import Configurable, Described
+from stickslip.core.description import (
     Bristle,
     Choice,
     Elements,
@@ -60,6 +59,7 @@ from stickslip.description import (
     fields_of,
     packed,
 )
+from stickslip.core.rebinding import bound, distinct, first_complaint, least, wrapped
 
 __all__ = [
     "Bristle",
@@ -122,7 +122,7 @@ class ReferenceKind(Described):
 @constructor_named
 @dataclass(frozen=True, eq=False, repr=False)
 class Law(Configurable):
-    """A friction law (``help("stickslip.spec")`` has its functions and their arguments).
+    """A friction law (``help("stickslip.core.spec")`` has its functions and their arguments).
 
     ``stickslip law --template friction`` prints a complete file of one; ``Model("my_law.py", fc=0.3)`` takes it, and
     ``stickslip law my_law.py --check`` tries it. In short::

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from stickslip.arguments import arguments_checked, constructor_named, insist_on_own
-from stickslip.errors import InputError, suggestion
-from stickslip.extras import needed
-from stickslip.values import same
-from stickslip.whole_files import draft_of
+from stickslip.core.arguments import arguments_checked, constructor_named, insist_on_own
+from stickslip.core.errors import InputError, suggestion
+from stickslip.core.extras import needed
+from stickslip.core.reprs import same
+from stickslip.core.whole_files import draft_of
 
 if TYPE_CHECKING:
     import pandas
@@ -145,15 +145,15 @@ class Record:
     @classmethod
     @arguments_checked
     def load(cls, path: str | os.PathLike[str]) -> Record:
-        """Read the record that `save` wrote to `path`, or the stream of a rig (`stickslip.stream`).
+        """Read the record that `save` wrote to `path`, or the stream of a rig (`stickslip.core.stream`).
 
         Raises
         ------
         InputError
             If there is no such file, or it is not a record.
         """
-        from stickslip import _stream_file as stream
-        from stickslip.config import refuse_endless
+        from stickslip.core import _stream_file as stream
+        from stickslip.core.config import refuse_endless
 
         refuse_endless(Path(path))
 

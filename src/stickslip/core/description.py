@@ -1,6 +1,6 @@
 """The parts of a description: parameters and states with unit and bounds, choices, elements, surroundings.
 
-`stickslip.spec` makes laws, control laws and references of them; it has all of these names too.
+`stickslip.core.spec` makes laws, control laws and references of them; it has all of these names too.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
-from stickslip.arguments import constructor_named, insist_on_own
-from stickslip.errors import LawError
+from stickslip.core.arguments import constructor_named, insist_on_own
+from stickslip.core.errors import LawError
 
 
 @constructor_named

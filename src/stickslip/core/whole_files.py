@@ -13,7 +13,7 @@ from collections.abc import Generator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from stickslip.errors import InputError, refuse_nul, unwritable
+from stickslip.core.errors import InputError, refuse_nul, unwritable
 
 DRAFTS = ".stickslip-*.part"
 """Pattern of the names of drafts, to remove those that a killed process left behind."""

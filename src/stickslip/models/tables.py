@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from stickslip import plugins
-from stickslip.config import Table
-from stickslip.control_spec import ControlLaw
-from stickslip.errors import ConfigError
-from stickslip.model import Model
-from stickslip.spec import Described, Law
+from stickslip.core.config import Table
+from stickslip.core.control_spec import ControlLaw
+from stickslip.core.errors import ConfigError
+from stickslip.core.spec import Described, Law
+from stickslip.models import plugins
+from stickslip.models.model import Model
 
 
 def models(tables: Mapping[str, Table], laws: Mapping[str, Law | ControlLaw]) -> dict[str, Model]:

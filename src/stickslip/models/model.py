@@ -11,13 +11,13 @@ from typing import Any, cast, overload
 
 import numpy as np
 
-from stickslip import plugins
-from stickslip.arguments import arguments_checked
-from stickslip.config import Table, read_toml
-from stickslip.errors import InputError, ModelRemark, ParameterError, suggestion
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.config import Table, read_toml
+from stickslip.core.errors import InputError, ModelRemark, ParameterError, suggestion
+from stickslip.core.reprs import Vector, call_of, unmasked
+from stickslip.core.spec import Law, ReferenceKind
+from stickslip.models import plugins
 from stickslip.references.through_points import velocities_through
-from stickslip.spec import Law, ReferenceKind
-from stickslip.values import Vector, call_of, unmasked
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

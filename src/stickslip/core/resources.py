@@ -7,7 +7,7 @@ import math
 import os
 from pathlib import Path
 
-from stickslip.errors import InputError
+from stickslip.core.errors import InputError
 
 MOST_JOBS = 32
 """Workers per processor"""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal, NamedTuple, Union, cast, get_args, get_origin
 
 NUMBERS = "one number a row"
-"""Mark of what may be an array, a list, a data frame's column, ..., of numbers (`stickslip.values.Vector`)."""
+"""Mark of what may be an array, a list, a data frame's column, ..., of numbers (`stickslip.core.reprs.Vector`)."""
 KINDS = {
     "Cascade": "a Cascade (a control law is given by its place, loop=...)",
     "Compensator": "Feedforward(...) or Feedback(...)",

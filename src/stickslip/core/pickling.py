@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, Self
 
-from stickslip.errors import LawError
+from stickslip.core.errors import LawError
 
 TEXT = "__source_text__"
 """Global of a module made of a law's file: the bytes that ran, whatever the file holds by now."""

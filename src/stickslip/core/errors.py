@@ -36,10 +36,10 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip.messages import ask_for_place, render
+from stickslip.core.messages import ask_for_place, render
 
 if TYPE_CHECKING:
-    from stickslip.record import Record
+    from stickslip.core.record import Record
 
 __all__ = [
     "CodeRefused",
@@ -70,7 +70,7 @@ __all__ = [
 class StickslipError(Exception):
     """Base of every error this package raises on purpose.
 
-    Its text is written for who reads it (`stickslip.messages`): on the command line, in Python or in the page.
+    Its text is written for who reads it (`stickslip.core.messages`): on the command line, in Python or in the page.
     """
 
     @property

@@ -21,10 +21,10 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
-from stickslip.arguments import arguments_checked
-from stickslip.errors import CodeRefused, InputError, UnusedPlace, unwritable
-from stickslip.messages import ask_for_code
-from stickslip.ownership import exposure_of
+from stickslip.core.arguments import arguments_checked
+from stickslip.core.errors import CodeRefused, InputError, UnusedPlace, unwritable
+from stickslip.core.messages import ask_for_code
+from stickslip.core.ownership import exposure_of
 
 _allowed: ContextVar[bool] = ContextVar("stickslip_code_allowed", default=False)
 _remember: ContextVar[bool] = ContextVar("stickslip_code_remember", default=False)

@@ -8,11 +8,11 @@ from collections import namedtuple
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Self, cast
 
-from stickslip.arguments import arguments_checked, no_number
-from stickslip.description import Choice, Field, Option, fields_of, packed
-from stickslip.errors import LawError, ParameterError, UnknownName, suggestion
-from stickslip.origin import Findable
-from stickslip.rules import is_number
+from stickslip.core.arguments import arguments_checked, no_number
+from stickslip.core.description import Choice, Field, Option, fields_of, packed
+from stickslip.core.errors import LawError, ParameterError, UnknownName, suggestion
+from stickslip.core.pickling import Findable
+from stickslip.core.type_rules import is_number
 
 
 class Described(Findable):

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip.binding import NEGATIVE
-from stickslip.errors import ParameterError
-from stickslip.model import Model
-from stickslip.spec import Surroundings
+from stickslip.core.errors import ParameterError
+from stickslip.core.rebinding import NEGATIVE
+from stickslip.core.spec import Surroundings
+from stickslip.models.model import Model
 
 USUAL_SCALE = 0.01
 """rad/s, over which a law's torque is taken to change where neither the law nor a bend of its curve says."""

@@ -1,4 +1,4 @@
-"""The file of a `stickslip.stream.Stream`: what is written where, and whether it is still ours."""
+"""The file of a `stickslip.core.stream.Stream`: what is written where, and whether it is still ours."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.errors import InputError, RecordFault
+from stickslip.core.errors import InputError, RecordFault
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Contents = tuple[Array, Mapping[str, Array], Mapping[str, str], Mapping[str, Any]]
