@@ -190,7 +190,8 @@ NOT_MESSAGES = ("cli", "messages.py")
 """What is written for the command line alone, and what writes the references."""
 COMMANDS = {
     "report/next_steps.py", "report/after_a_map.py",  # commands to copy, next to the same in Python
-    "exports/arduino.py", "exports/linuxcnc.py", "exports/matlab.py", "web/jobs.py", "web/worker.py",  # of other programs
+    "exports/arduino.py", "exports/linuxcnc.py", "exports/matlab.py", "web/jobs.py",  # of other programs
+    "web/worker.py",  # of other programs
     "web/server.py",  # said in the terminal before there is a page
 }  # fmt: skip
 
