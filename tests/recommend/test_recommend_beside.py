@@ -154,7 +154,7 @@ def test_what_is_wrong_is_said_in_a_line():
     with pytest.raises(UnknownName, match="unknown compensator 'dobs'; did you mean 'dob'"):
         compensators_of(("dobs",))
     with pytest.raises(
-        InputError, match="compensators dob,all: 'all' stands alone; give it without the others"
+        InputError, match="compensators=\"dob,all\": 'all' stands alone; give it without the others"
     ):
         compensators_of(("dob", "all"))
     # None is what is not given: only the loop is found wanting.
