@@ -34,9 +34,9 @@ class Estimate:
     ----------
     name, unit, symbol : str
         ``k[1]`` is element 1 (counted from 0) of parameter ``k``.
-    Point estimate and standard deviation; std is NaN if the noise level is unknown.
-        Point estimate and standard deviation; std is not a number where the noise level is unknown.
-    95 % interval; infinite where the data set no limit.
+    value, std : float
+        Point estimate and standard deviation; std is NaN if the noise level is unknown.
+    lower, upper : float
         95 % interval; infinite where the data set no limit.
     identified : bool
     verdict : str

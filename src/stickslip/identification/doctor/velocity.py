@@ -287,9 +287,7 @@ def velocity_scale(view: View) -> Iterator[Finding]:
 
 
 def _another_unit(size: float, view: View) -> Finding:
-    """Return the finding on a velocity of another size than the position's derivative, with the units that explain
-    it.
-    """
+    """Return the finding on a velocity of another size than the position's derivative, with units that explain it."""
     message = (
         f"velocity is {size:.4g} times the change of position per second, where both are taken in SI"
         f" ({view.record.units['velocity']})"
