@@ -11,8 +11,8 @@ from stickslip.identification.alternatives.alternative import Alternative
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BUMPS, WIDTH = 6, 1.5
-"""Number of bumps over the logarithm of speed, and their spacing, octaves: 1.5 decades below the highest speed or
-more."""
+"""Number of bumps over the logarithm of speed; their spacing, octaves. They reach 7.5 octaves below the highest
+speed."""
 REMEDY = "record constant speeds, at least three a decade"
 
 

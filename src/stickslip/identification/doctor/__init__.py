@@ -131,7 +131,7 @@ class Diagnosis:
 
 
 def of_arrays(record: Record) -> bool:
-    """Whether the signals were given as arrays by name: they have units and no columns."""
+    """Return whether the signals were given as arrays by name: they have units and no columns."""
     reading: dict[str, Any] = record.meta.get("reading", {})
     sources = {c["source"] for c in reading.get("columns", ())}
     return not reading.get("file") and sources == {"map"}

@@ -20,8 +20,8 @@ TURNED, ROUNDS = 0.5, 4
 """Greatest residual, relative to that of the recorded torque, once each row has the sign that its motion requires;
 number of iterations of these signs."""
 REACHES, UNEXPLAINED = 0.02, 0.5
-"""A magnitude comes within this part of the largest torque whenever its torque changes sign; and a line explains at
-most this part of it. A weight that exceeds friction and acceleration is explained by more."""
+"""Part of the largest torque to which a magnitude falls when its torque changes sign; and part of the torque that a
+line then explains at most: a weight that exceeds friction and acceleration is explained by more."""
 
 
 def unsigned(view: View) -> Iterator[Finding]:

@@ -34,8 +34,7 @@ FEW = 0.05
 BACK = 0.25
 """Greatest change of the signal across a spike, part of the spike's size."""
 ABRUPT = 0.3
-"""Least leap of a spike from row to row, part of its size; greatest ratio of its neighbours' range to its size,
-inverted."""
+"""Least leap of a spike from row to row, part of its size; least size of a spike, part of its neighbours' range."""
 ROWS, LATE = 3, 3
 """Rows over which a velocity is computed before and after a spike; greatest delay of a torque's column, rows."""
 SEEN, SHARE = 90.0, 0.3

@@ -67,8 +67,8 @@ def encirclements(found: LoopResponse, inertia: float, bandwidth: float, damping
     """Count the encirclements of -1 by the loop with a PD of that bandwidth (Hz)."""
     f = found.frequency
     locus = pd_response(inertia, bandwidth, damping, f, found.sample_time) * found.response
-    # An inertia with a PD starts below the real axis, a spring to its right: the lowest measured frequency may already
-    # be above it.
+    # The locus of an inertia with a PD comes from below the real axis, that of a spring from the right: the lowest
+    # measured frequency may already be above it.
     below = np.concatenate([[True], locus.imag < 0.0])
     before = np.concatenate([[locus[0].real - 1j], locus])
     size = np.abs(locus)
