@@ -271,11 +271,11 @@ class View:
 
     @cached_property
     def given_velocity(self) -> Array:
-        """The velocity's own column, filtered as `smooth` is; of short steps the filter takes half."""
+        """The velocity's own column, filtered as in `smooth`, which halves short steps."""
         return self.filtered("velocity", self.smooth.velocity.size if self.smooth else 0)
 
     def filtered(self, channel: str, count: int) -> Array:
-        """A channel at so many even times, zero-phase filtered, shape (count,)."""
+        """Return a channel at `count` even times, zero-phase filtered, shape (count,)."""
         grid = np.linspace(float(self.time[0]), float(self.time[-1]), count)
         raw = np.interp(grid, self.time, self.values(channel))
         begin = raw[0] if channel == "position" else 0.0
@@ -283,7 +283,7 @@ class View:
 
 
 def row(index: int, view: View) -> str:
-    """Where a row of the record is: its number in the file, from 1, and its time if that is known."""
+    """Return a row's number in the file, from 1, and its time if that is known."""
     number = view.file_rows[index]
     if math.isfinite(view.record.time[index]):
         return f"row {number}, t = {view.record.time[index]:.6g} s"
