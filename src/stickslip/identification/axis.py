@@ -1,9 +1,9 @@
 """A whole axis from any record: inertia, gravity or constant torque, friction and delay jointly.
 
-Gross sliding tells inertia, constant torque, gravity, delay and the steady friction curve
-(`stickslip.identification.sliding`). What reversals, break-away and slow motion tell of a law comes from its simulation
-beside that (`stickslip.identification.slow_motion`). Of several laws the error on held-out data chooses
-(`stickslip.identification.laws`). Records without the drive's signal are fitted by the output error
+Gross sliding determines inertia, constant torque, gravity, delay and the steady friction curve
+(`stickslip.identification.sliding`). Reversals, break-away and slow motion determine a law's other parameters through
+its simulation, given those (`stickslip.identification.slow_motion`). Among several laws the error on held-out data
+decides (`stickslip.identification.laws`). Records without the drive's signal are fitted by the output error
 (`stickslip.identification.output_error.output`).
 """
 
@@ -75,22 +75,22 @@ from stickslip.models.model import Model
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 AUTOMATIC = ("coulomb", "stribeck", "lugre")
-"""Laws among which the held-out error chooses where none is named."""
+"""Candidate laws if none is named; the held-out error decides among them."""
 INTERVALS = ("prediction", "covariance")
 SLOWEST = 0.25
-"""s between two samples, from which on a record says nothing of an axis's dynamics."""
+"""Sample period, s, from which on a record contains no information about an axis's dynamics."""
 FALLS = 0.95
 """Probability from which on friction is taken to fall with velocity."""
 LOOP_OFF = 0.3
-"""Relative error of the simulated loop's drive signal from which on its gains are doubted."""
+"""Relative error of the simulated loop's drive signal from which on a warning about its gains is given."""
 NOT_SIMULATED = "The law was not simulated beside the record:"
 USUAL_SPEEDS = np.geomspace(1e-3, 1e2, 40)
-"""rad/s (m/s)."""
+"""Speeds at which the meanings of a law's parameters are compared, rad/s (m/s)."""
 UNEVEN = 0.3
-"""Part of their mean by which levels of either direction may differ before a constant torque is likelier."""
+"""Relative difference of the levels by direction from which on a constant torque is more likely."""
 BY_DIRECTION = "A torque offset cannot be distinguished from friction that differs by direction."
 BESIDE_AXIS = {"drive_gain", "back_emf", "backlash", "controller_gain", "load_motor", "load_external"}
-"""Parts of an axis that sliding does not know: where one is fitted or given, the simulation fits all."""
+"""Parts of an axis that sliding does not model: if one is fitted or given, the simulation fits everything."""
 
 
 def identify_axis(
@@ -111,7 +111,7 @@ def identify_axis(
     estimate: EstimateSliding = estimate_sliding,
     progress: Callable[[str], None] = silent,
 ) -> Identification:
-    """Identify an axis: which law it has, its values, and how sure they are.
+    """Identify an axis: its law, its parameters and their uncertainty.
 
     Parameters
     ----------
@@ -120,32 +120,33 @@ def identify_axis(
     axis : ServoAxis
     laws : sequence of str or Law
         Names, paths of law files, or laws. Of several, the one with the fewest parameters within one standard error of
-        the best held-out error is taken (Hastie, Tibshirani and Friedman 2009, 7.10).
+        the best held-out error is chosen (Hastie, Tibshirani and Friedman 2009, 7.10).
     validation : sequence of Experiment
         Held out. Without any, and with several laws, the last 30 % of every record are held out for the choice (the
-        first, where the end is half as fast again as all before), and the chosen law is then fitted to all.
+        first 30 %, if the end is more than 1.5 times as fast as everything before), and the chosen law is then fitted
+        to all.
     free, frozen, values, extras
         As in `stickslip.identification.output_error.output.output_error`.
     robust, profiles
-        As there, for the output error alone; the prediction error weighs outliers anyway.
+        As there, for the output error only; the prediction error weights outliers down anyway.
     per_direction : bool
-        Whether friction has parameters of its own for each direction, in every law that allows it. A constant torque
-        cannot be told from that: `offset` is kept at 0 unless it is free or given.
+        Whether friction has separate parameters for each direction, in every law that allows it. A constant torque
+        cannot be distinguished from that: `offset` is held at 0 unless it is free or given.
     intervals : {"prediction", "covariance"}
-        From sliding and the prediction error, where the records allow it; or from the covariance of the output error,
-        which is too narrow where noise is coloured.
+        From sliding and the prediction error, if the records allow it; or from the covariance of the output error,
+        which is too narrow if the noise is coloured.
     skew : float, optional
-        s by which the torque's column lies behind the torque that acted, where it is known; estimated otherwise.
+        Delay of the torque's column relative to the torque that acted, s, if known; estimated otherwise.
     estimate : callable
         `estimate_sliding`, or a memo of it.
     progress : callable
-        Is told what begins, in a few words.
+        Called with a short description of each step as it starts.
 
     Returns
     -------
     Identification
-        ``details`` holds ``mechanics``, ``inverse`` (`InverseDynamics` or None), ``sliding`` (`SlidingPosterior` or
-        None), ``slow_motion`` (`LawFit`, where a law was simulated), ``output`` (`FittedAxis`) and ``candidates``.
+        ``details`` contains ``mechanics``, ``inverse`` (`InverseDynamics` or None), ``sliding`` (`SlidingPosterior` or
+        None), ``slow_motion`` (`LawFit`, if a law was simulated), ``output`` (`FittedAxis`) and ``candidates``.
 
     Raises
     ------
@@ -204,17 +205,17 @@ def identify_axis(
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What the records say before a law is chosen.
+    """Results that do not depend on the law.
 
     Attributes
     ----------
     recorded, experiments : sequence of Experiment
-        As they were recorded, and without the torque over position and time that sliding found.
+        As recorded, and without the torque over position and time that sliding found.
     aligned : sequence of Experiment
-        The same, their torque moved to when it acted.
+        The same, with the torque shifted to when it acted.
     axis : ServoAxis
     start : InverseDynamics or None
-        Plain least squares, where the records allow it.
+        Plain least squares, if the records allow it.
     sliding : SlidingPosterior or None
     notes : tuple of str
     """
@@ -229,7 +230,7 @@ class Seen:
 
     @property
     def evidence(self) -> Evidence:
-        """For a law's simulation; only where `start` is there."""
+        """Input for a law's simulation; requires `start`."""
         assert self.start is not None
         return Evidence(self.experiments, self.axis, self.start, self.sliding)
 
@@ -278,7 +279,7 @@ def look_at(
 
 
 def hold_likeliest_exponent(asked: Asked, laws: Sequence[Law], sliding: SlidingPosterior | None) -> Asked:
-    """Hold the exponent of friction's fall where no law and no user fixes it: laws are compared with one."""
+    """Hold the exponent of friction's fall if no law and no user fixes it, to compare all laws with the same one."""
     for law in laws:
         if exponents := exponents_open(asked, law, sliding):
             return replace(asked, values={**asked.values, "delta_s": next(iter(exponents))})
@@ -286,7 +287,7 @@ def hold_likeliest_exponent(asked: Asked, laws: Sequence[Law], sliding: SlidingP
 
 
 def exponents_open(asked: Asked, law: Law, sliding: SlidingPosterior | None) -> dict[float, float]:
-    """Exponents of a law's fall with their probabilities from sliding; none where the law or the user fixes it."""
+    """Return the exponents of a law's fall with their probabilities from sliding; none if law or user fixes it."""
     has = any(f.name == "delta_s" for f in law.fields)
     if sliding is None or not has or "delta_s" in (*asked.free, *asked.values):
         return {}
@@ -296,9 +297,9 @@ def exponents_open(asked: Asked, law: Law, sliding: SlidingPosterior | None) -> 
 def sliding_asked(
     axis: ServoAxis, asked: Asked, laws: Sequence[Law], per_direction: bool, skew: float | None
 ) -> SlidingAsked:
-    """What sliding is given: what is held, and the delay.
+    """Return the request for the sliding estimate: held values and the delay.
 
-    Level and slope of friction only where every law means these by their names and both directions share them.
+    Level and slope of friction are held only if every law means these by their names and both directions share them.
     """
     names = {"inertia"} if per_direction else {"inertia", "offset"}
     if not per_direction and all(means_the_same(Model(law, **law.example), USUAL_SPEEDS) for law in laws):
@@ -314,7 +315,7 @@ def sliding_asked(
 def without_alternatives(
     experiments: Sequence[Experiment], axis: ServoAxis, sliding: SlidingPosterior
 ) -> list[Experiment]:
-    """The experiments, torque over position and time that sliding found taken out of their drive's signal."""
+    """Return the experiments without the torque over position and time that sliding found in their drive signals."""
     out = list[Experiment]()
     for number, t in enumerate(experiments):
         record = sliding.rows.sources[number]
@@ -324,14 +325,14 @@ def without_alternatives(
         if t.drive is None or not np.any(torque) or np.any(supply == 0.0):
             out.append(t)
             continue
-        # The column lies behind the torque that acted.
+        # The column is delayed relative to the torque that acted.
         acted = np.interp(t.time - sliding.numbers["skew"].value, record.time, torque)
         out.append(replace(t, drive=t.drive - acted / (gain * supply)))
     return out
 
 
 def aligned(experiment: Experiment, sliding: SlidingPosterior | None) -> Experiment:
-    """The experiment, its drive's signal moved to act from its row to the next, as simulations take it."""
+    """Return the experiment with its drive signal shifted to act from its row to the next, as in simulations."""
     if sliding is None or experiment.drive is None:
         return experiment
     late = sliding.numbers["skew"].value + 0.5 * experiment.period
@@ -342,7 +343,7 @@ def compared(
     seen: Seen, fitted: Sequence[Experiment], held: Sequence[Experiment], laws: Sequence[Law], asked: Asked,
     simulated: bool, progress: Callable[[str], None],
 ) -> list[Candidate]:  # fmt: skip
-    """The laws judged as the chosen one will be fitted; by the output error where that cannot be."""
+    """Score the laws by the prediction error as in the final fit, or by the output error if that fails."""
     if simulated:
         try:
             return compare_laws(replace(seen, experiments=fitted).evidence, held, laws, asked, progress)
@@ -360,7 +361,7 @@ def assembled(
     seen: Seen, law: Law, asked: Asked, fit: LawFit, validation: Sequence[Experiment], candidates: Sequence[Candidate],
     notes: Sequence[str],
 ) -> Identification:  # fmt: skip
-    """The axis's own numbers from sliding and the law's from slow motion beside it."""
+    """Combine the axis's parameters from sliding with the law's from slow motion."""
     vector, named = fit.vector, fit.vector.named(fit.u)
     mechanics, correlation = of_axis(seen, asked, fit.vector)
     estimates = (*mechanics, *fit.estimates)
@@ -381,7 +382,7 @@ def assembled(
 
 
 def of_axis(seen: Seen, asked: Asked, vector: Vector) -> tuple[list[Estimate], Array]:
-    """Estimates of inertia, constant torque and gravity from sliding, with their correlation; none without sliding."""
+    """Return inertia, constant torque and gravity from sliding, with their correlation; none without sliding."""
     sliding = seen.sliding
     if sliding is None:
         return [], np.zeros((0, 0))
@@ -403,7 +404,7 @@ def of_axis(seen: Seen, asked: Asked, vector: Vector) -> tuple[list[Estimate], A
 
 
 def estimate_from(p: Parameter, sliding: SlidingPosterior, name: str, scale: float) -> Estimate:
-    """A number of sliding as an estimate with its verdict."""
+    """Return a number of sliding as an estimate with its verdict."""
     number = sliding.numbers[name]
     low, high = max(number.lower, p.par.lower), min(number.upper, p.par.upper)
     value = min(max(number.value, low), high)
@@ -420,7 +421,7 @@ def estimate_from(p: Parameter, sliding: SlidingPosterior, name: str, scale: flo
 def gravity_estimates(
     described: Mapping[str, Parameter], sliding: SlidingPosterior, scale: float
 ) -> list[Estimate]:
-    """Size and angle of a pendulum's gravity from its two amplitudes."""
+    """Return size and angle of a pendulum's gravity from its two amplitudes."""
     sine, cosine = sliding.numbers["gravity_sin"], sliding.numbers["gravity_cos"]
     size, angle = hanging(sine.value, cosine.value, sliding.rows.position)
     along = math.hypot(sine.value * sine.half, cosine.value * cosine.half) / max(size, 1e-300)
@@ -441,7 +442,7 @@ def by_output(
     candidates: Sequence[Candidate],
     notes: Sequence[str],
 ) -> Identification:
-    """An axis fitted by the output error."""
+    """Return the result of an axis fitted by the output error."""
     return finished(seen, result, result.estimates, result.fit.correlation, validation, candidates, notes, {})
 
 
@@ -449,7 +450,7 @@ def finished(
     seen: Seen, fitted: FittedAxis, estimates: Sequence[Estimate], correlation: Array, validation: Sequence[Experiment],
     candidates: Sequence[Candidate], notes: Sequence[str], details: Mapping[str, Any],
 ) -> Identification:  # fmt: skip
-    """Everything in one `Identification`, errors and notes included."""
+    """Combine all results in one `Identification`, with errors and notes."""
     experiments, problem = fitted.problem.experiments, fitted.problem
     estimates = within_a_turn(estimates, np.concatenate([t.position for t in experiments]))
     estimates = apart_from_weight(judged_load(estimates, seen.start, fitted.mechanics))
@@ -494,7 +495,7 @@ def finished(
 
 
 def loop_notes(seen: Seen, fitted: FittedAxis, misfit: Mapping[str, float]) -> list[str]:
-    """That the loop does not make the drive's signal that was recorded; nothing where it does, or there is none."""
+    """Return a note if the simulated loop does not reproduce the recorded drive signal; none without a loop."""
     named = fitted.problem.vector.named(fitted.u)
     if others := doubted_loops(seen.recorded, named["controller_gain"]):
         return others
@@ -507,7 +508,7 @@ def loop_notes(seen: Seen, fitted: FittedAxis, misfit: Mapping[str, float]) -> l
 
 
 def narrow_note(result: OutputError) -> str:
-    """That intervals of the output error are too narrow where noise is coloured."""
+    """Return a note that intervals of the output error are too narrow if the noise is coloured."""
     said = "Intervals come from the covariance of the output error: too narrow where noise is coloured"
     if result.problem.law.velocity_scale:
         said += ", most of all for what slow motion and break-away determine"
@@ -515,7 +516,7 @@ def narrow_note(result: OutputError) -> str:
 
 
 def advice(estimates: Sequence[Estimate], law: Law, sliding: SlidingPosterior | None) -> tuple[str, ...]:
-    """What to record to determine what is not identified."""
+    """Return the recordings that would determine what is not identified."""
     missing = {e.name.partition("[")[0] for e in estimates if not e.identified}
     units = {f.name: f.par.unit for f in law.fields}
     out = list[str]()
@@ -563,7 +564,7 @@ def refuse_slow(experiments: Sequence[Experiment]) -> None:
 
 
 def refuse_weight(sliding: SlidingPosterior | None, axis: ServoAxis) -> None:
-    """Refuse friction per direction where it would drive the axis in one of them: a constant torque acts.
+    """Refuse friction per direction that would drive the axis in one of them: a constant torque acts.
 
     Raises
     ------
@@ -581,7 +582,7 @@ def refuse_weight(sliding: SlidingPosterior | None, axis: ServoAxis) -> None:
 
 
 def apart_from_weight(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
-    """The estimates, levels of both directions refused where they differ by more than friction usually does."""
+    """Return the estimates; levels by direction that differ by more than is usual become not identified."""
     level = {e.name: e for e in estimates if e.name in ("fc", "fc_negative")}
     if len(level) < 2 or any(e.name == "offset" for e in estimates):
         return tuple(estimates)
@@ -601,7 +602,7 @@ def apart_from_weight(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
 
 
 def refuse_known_torque(frozen: Sequence[str], values: Mapping[str, float], axis: ServoAxis) -> None:
-    """Refuse a constant torque that is held beside friction per direction: sliding counts it as friction.
+    """Refuse a constant torque held together with friction per direction: sliding counts it as friction.
 
     Raises
     ------

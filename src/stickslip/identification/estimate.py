@@ -1,4 +1,4 @@
-"""What an identification hands back: estimates with intervals and verdicts, a model, pictures as plain numbers."""
+"""The result of an identification: estimates with intervals and verdicts, a model, and pictures as plain numbers."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def silent(_what: str) -> None:
-    """Tell nobody how far an identification is."""
+    """Do nothing: the progress callback of a silent identification."""
 
 
 LINEAR = ServoAxis(motion="linear")
 DECADES = 4.0
-"""That an interval spans at most where its ends are worth printing."""
+"""Decades that an interval of a positive number may span for its bounds to be worth printing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,16 +35,16 @@ class Estimate:
     name, unit, symbol : str
         ``k[1]`` is element 1 (counted from 0) of parameter ``k``.
     value, std : float
-        Point estimate and standard deviation; std is not a number where the noise level is unknown.
+        Point estimate and standard deviation; std is NaN if the noise level is unknown.
     lower, upper : float
         95 % interval; infinite where the data set no limit.
     identified : bool
     verdict : str
-        Why it is not identified; empty where it is.
+        Reason why it is not identified; empty if it is.
     cause : str
-        The alternative model that widens it most ("play", "cogging 4", ...); empty where none has a third of it.
+        Alternative model that widens it most ("play", "cogging 4", ...); empty if none causes a third of the variance.
     share : float
-        That alternative's part of the variance.
+        Part of the variance that this alternative causes.
     """
 
     name: str
@@ -69,11 +69,11 @@ class Estimate:
 
     @property
     def undetermined(self) -> bool:
-        """Whether the interval of a positive number spans more than `DECADES`: its ends then tell nothing."""
+        """Whether the interval of a positive number spans more than `DECADES`: its bounds then carry no information."""
         return self.lower > 0.0 and self.upper > 10.0**DECADES * self.lower
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data; what is not finite becomes None, since JSON has no such numbers."""
+        """Return plain data; values that are not finite become None, since JSON has no such numbers."""
         numbers = {k: getattr(self, k) for k in ("value", "std", "lower", "upper")}
         return {
             "name": self.name, "unit": self.unit, "symbol": self.symbol,
@@ -99,7 +99,7 @@ class Held:
     value: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {"name": self.name, "unit": self.unit, "symbol": self.symbol, "value": self.value}
 
 
@@ -110,12 +110,12 @@ class Trace:
     Attributes
     ----------
     label : str
-        Empty for none in the legend.
+        Empty for no entry in the legend.
     x, y : array, shape (n,)
     kind : str
-        "line", "points", "open points", "cloud" (many small points), "faint" (one of many), "wide" (for another line
-        to lie on), "band" (between `y` and `y2`), "own band" (the same in the colour of the line that follows),
-        "vertical" (a line at every x), or "rug" (a mark at the foot at every x; `y` is not looked at).
+        "line", "points", "open points", "cloud" (many small points), "faint" (one of many), "wide" (drawn under another
+        line), "band" (between `y` and `y2`), "own band" (the same in the colour of the line that follows), "vertical"
+        (a line at every x), or "rug" (a mark on the axis at every x; `y` is ignored).
     y2 : array, shape (n,), optional
     """
 
@@ -133,9 +133,9 @@ class Picture:
     Attributes
     ----------
     name : str
-        For a file's name.
+        Used in file names.
     title, message : str
-        What it is; what it shows.
+        Title; the finding that it shows.
     x_label, y_label : str
         With the unit.
     traces : tuple of Trace
@@ -160,23 +160,23 @@ class Identification:
     ----------
     method : str
     model : Model or None
-        None where the method does not yield a whole law.
+        None if the method does not yield a complete law.
     estimates : tuple of Estimate
     correlation : array, shape (n, n)
-        Of the estimates, in their order; not a number where it is undefined.
+        Correlation of the estimates, in their order; NaN where it is undefined.
     misfit : mapping of str to float
-        Numbers that say how well it fits; `misfit_unit` gives their units.
+        Goodness of fit; `misfit_unit` gives the units.
     notes : tuple of str
-        What the user must know, one sentence each.
+        Caveats for the user, one sentence each.
     measure_next : tuple of str
-        What to measure to settle what is not identified.
+        Measurements that would determine what is not identified.
     pictures : tuple of Picture
     details : mapping
-        The method's own numbers, plain data or arrays.
+        Further results of the method, plain data or arrays.
     findings : tuple
-        What the check of the records found, in its order.
+        Findings of the log's check, in its order.
     held : tuple of Held
-        What the user gave, and so was not fitted.
+        Values given by the user and not fitted.
     """
 
     method: str
@@ -212,7 +212,7 @@ class Identification:
         return replace(self, estimates=estimates, misfit=_in_newtons(self.misfit), details=details)
 
     def misfit_unit(self, name: str) -> str:
-        """Unit of a number of `misfit`; empty for a ratio or a count."""
+        """Return the unit of an entry of `misfit`; empty for a ratio or a count."""
         for ending, unit in (("_Nm", "N·m"), ("_N", "N"), ("_rad", "rad")):
             if name.endswith(ending):
                 return unit
@@ -248,7 +248,7 @@ class Identification:
         return out
 
     def as_dict(self) -> dict[str, Any]:
-        """Law, estimates, correlation, misfit and sentences as plain data for JSON; no pictures."""
+        """Return law, estimates, correlation, misfit and notes as plain data for JSON, without pictures."""
         correlation = [[c if math.isfinite(c) else None for c in row] for row in self.correlation.tolist()]
         return {
             "method": self.method,
@@ -264,7 +264,7 @@ class Identification:
 
 
 def missing_fall(misfit: Mapping[str, float]) -> float:
-    """By how much friction falls with velocity where the law has no fall, N·m (N); 0 where it misses none."""
+    """Return the fall of friction with velocity that the law lacks, N·m (N); 0 if it lacks none."""
     return next((misfit[k] for k in ("fall_missing_Nm", "fall_missing_N") if k in misfit), 0.0)
 
 

@@ -1,4 +1,4 @@
-"""What a record can be evidence of: physical bounds of friction, and parameters that act at other speeds."""
+"""Limits of the evidence in a record: physical bounds of friction, and parameters that act at other speeds."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from stickslip.simulation.prescribed.steady import Steady
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 EXTRAPOLATED = "extrapolated"
-"""How the verdict on a parameter begins whose evidence lies outside the recorded speeds."""
+"""Start of the verdict on a parameter that acts outside the recorded speeds."""
 SHOWN = 0.1
-"""Part of its greatest effect on the sliding torque that a parameter must have at a recorded speed."""
+"""Least effect on the sliding torque at a recorded speed, as a part of the parameter's greatest effect."""
 DECADES, PER_DECADE = 6, 24
-"""Below the slowest and above the fastest speed, in which an effect is looked for; speeds per decade."""
+"""Decades below the slowest and above the fastest speed in which effects are searched; speeds per decade."""
 SATURATED = 0.05
-"""Part by which an effect may still grow in the last decade for its parameter to be a level, not a slope."""
+"""Greatest relative growth of an effect over the last decade of a level; a slope grows by more."""
 VELOCITIES = ("rad/s", "m/s")
 BELOW, FLATTEST = 1000.0, 0.3
-"""Parts of the slowest speed, down to which a Stribeck velocity is looked for; least shape factor."""
+"""Least Stribeck velocity as a divisor of the slowest speed; least shape factor."""
 CHANGE = 1e-4
-"""Relative change of a parameter that shows its effect."""
+"""Relative change of a parameter that reveals its effect."""
 
 
 def bend_limits(vector: Vector, speeds: Array) -> dict[str, tuple[float, float]]:
-    """Bounds of the search for what bends the sliding curve: its velocities and its shape.
+    """Return the search bounds of the parameters that bend the sliding curve: its velocities and its shape factors.
 
-    A Stribeck part that reaches far beyond the fastest speed, or one of a shape factor near 0, is a level and a slope
-    under other names: any fc and any sigma2 would then do.
+    A Stribeck part that reaches far beyond the fastest speed, or that has a shape factor near 0, is equivalent to a
+    level and a slope: fc and sigma2 would then be arbitrary.
     """
     moving = speeds[speeds > 0.0]
     if moving.size == 0:
@@ -48,7 +48,7 @@ def bend_limits(vector: Vector, speeds: Array) -> dict[str, tuple[float, float]]
 def bounded_verdicts(
     estimates: Iterable[Estimate], limits: dict[str, tuple[float, float]], what: str
 ) -> tuple[Estimate, ...]:
-    """The estimates, those refused that only such a bound, named by `what`, limits."""
+    """Return the estimates; those that only such a bound, named by `what`, limits become not identified."""
     out: list[Estimate] = []
     for e in estimates:
         least, most = limits.get(e.name, (-np.inf, np.inf))
@@ -61,9 +61,9 @@ def bounded_verdicts(
 
 
 def without_inverted_rest(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]:
-    """Return the estimates, a break-away torque below the Coulomb torque as not identified.
+    """Return the estimates; a break-away torque below the Coulomb torque becomes not identified.
 
-    Break-away takes at least what sliding takes: a curve that rises from rest has another cause.
+    Break-away requires at least the sliding torque: a curve that rises from rest has another cause.
     """
     levels = {e.name: e for e in estimates}
     out: list[Estimate] = []
@@ -83,17 +83,17 @@ def without_inverted_rest(estimates: Sequence[Estimate]) -> tuple[Estimate, ...]
 def within_speeds(
     estimates: Sequence[Estimate], vector: Vector, u: Array, speeds: Array, unit: str = "rad/s"
 ) -> tuple[Estimate, ...]:
-    """The estimates, those called extrapolated whose parameters act outside the recorded speeds.
+    """Return the estimates; parameters that act outside the recorded speeds become extrapolated.
 
     Parameters
     ----------
     estimates : sequence of Estimate
     vector : Vector
-        Of the law that was fitted, and the coordinates `u` found.
+        The fitted law's vector, with the estimated coordinates `u`.
     speeds : array, shape (n,)
-        Sizes of the velocities that were recorded, 0 for a break-away torque.
+        Recorded speeds, 0 for a break-away torque.
     unit : str
-        Of the speeds.
+        Unit of the speeds.
     """
     outside = extrapolated(vector, u, speeds)
     moving = speeds[speeds > 0.0]
@@ -113,11 +113,11 @@ def within_speeds(
 
 
 def extrapolated(vector: Vector, u: Array, speeds: Array) -> dict[str, float]:
-    """Free parameters that act beyond the recorded speeds and hardly at them, and the speed at which they act most.
+    """Return the free parameters that act mainly outside the recorded speeds, with the speed of their greatest effect.
 
-    A parameter is evident where it changes the sliding torque by a tenth at least of what it changes it by at any
-    speed. One whose effect grows with the speed without end, a slope, is evident at the fastest. A Stribeck velocity
-    must itself lie among the speeds, and with it the shape of the curve around it.
+    A parameter has evidence if its effect on the sliding torque at a recorded speed is at least a tenth of its effect
+    at any speed. A slope, whose effect grows without limit, has its evidence at the fastest speed. A Stribeck velocity
+    must itself be within the recorded speeds, and so must the one that belongs to a shape factor.
     """
     assert vector.base is not None
     moving = speeds[speeds > 0.0]
@@ -128,7 +128,7 @@ def extrapolated(vector: Vector, u: Array, speeds: Array) -> dict[str, float]:
     slower = np.append(0.0, low * np.logspace(-DECADES, 0.0, number, endpoint=False))
     faster = high * np.logspace(0.0, DECADES, number + 1)
     grid = np.concatenate([slower, np.geomspace(low, high, number), faster])
-    # In both directions, which have parameters of their own in some laws.
+    # In both directions, since some laws have separate parameters for each.
     steady, seen = (
         Steady(vector.base.law, np.append(v, -v), np.repeat([1.0, -1.0], v.size))
         for v in (grid, np.unique(np.concatenate([speeds, moving])))
@@ -155,7 +155,7 @@ def extrapolated(vector: Vector, u: Array, speeds: Array) -> dict[str, float]:
 
 
 def bends_outside(vector: Vector, u: Array, low: float, high: float) -> set[str]:
-    """Velocities of the law that lie outside the recorded ones, and the shape factors where its only one does."""
+    """Return the law's velocities outside the recorded ones, and its shape factors if its only velocity is outside."""
     assert vector.base is not None
     law, named = vector.base.law, vector.named(u)
     out = {p.name: named[p.name] for p in vector.free if p.par.unit in VELOCITIES}

@@ -1,4 +1,4 @@
-"""A record as the identification of an axis sees it: one motion, what drove it, and the loop around it."""
+"""One record prepared for identification: a motion, the signal that drove it, and the control loop around it."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ DRIVES = {
     "torque": "torque", "motor_torque": "torque", "current": "current", "torque_percent": "rated_torque",
     "voltage": "voltage",
 }  # fmt: skip
-"""Channels that may hold the drive's signal, in the order in which they are looked for, and what they are."""
+"""Channels that may contain the drive's signal, in order of preference, with the quantity of each."""
 TORQUES = ("motor_torque", "torque", "sensor_torque", "friction_torque")
-"""Channels of a torque that methods without an equation of motion read, in the order in which they are looked for."""
+"""Torque channels read by methods without an equation of motion, in order of preference."""
 REFERENCES = ("position_reference", "reference")
 FASTER, WINDOW = 1.5, 0.1
-"""Times as fast that the end of an experiment must be to be fitted instead of its start; s over which a speed is
-averaged."""
+"""Ratio of top speeds from which the end of an experiment is fitted instead of its start; averaging time of a speed,
+s."""
 FEWEST = 50
 MEAN_OVER = 0.02
-"""s over which `Experiment.velocity` averages."""
+"""Averaging time of `Experiment.velocity`, s."""
 ROUNDED = 0.02
-"""Part of a row by which the times of evenly spaced samples may be off as they are written."""
+"""Rounding of evenly spaced times, as a part of the sample period."""
 SPACING = 1e-3
-"""Part of the usual distance between two samples by which equally spaced ones may differ from it."""
+"""Relative tolerance of the distance between equally spaced samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,22 +45,22 @@ class Experiment:
     ----------
     name : str
     time : array, shape (n,)
-        s, strictly ascending; may be irregular. Times that were rounded are made even, as the samples were.
+        s, strictly increasing; may be irregular. Rounded times of evenly spaced samples are made even.
     position : array, shape (n,)
-        At the axis's `seen_from`, rad (m).
+        Position at the axis's `seen_from`, rad (m).
     drive : array, shape (n,), or None
         The recorded signal of the drive.
     quantity : str
-        What it is: one of `stickslip.machines.servo.DRIVE_QUANTITIES`.
+        Quantity of `drive`: one of `stickslip.machines.servo.DRIVE_QUANTITIES`.
     reference : array, shape (n,), or None
-        The reference position, at `seen_from`.
+        The reference position at `seen_from`, rad (m).
     loop : Loop or None
-        The controller that makes the drive's signal from reference and position. With reference and loop the
-        closed loop is simulated; without, the recorded drive.
+        The controller that computes the drive's signal from reference and position. With reference and loop the closed
+        loop is simulated; otherwise the recorded drive signal is applied.
     supply : array, shape (n,), or None
         Factor on the drive's signal, such as the supply voltage under a duty cycle.
     used : array of bool, shape (n,), or None
-        Rows that the fit looks at; all where None. The whole record is simulated in any case.
+        Rows that are fitted; None for all. The whole record is simulated in any case.
     """
 
     name: str
@@ -108,16 +108,16 @@ class Experiment:
 
     @property
     def rows(self) -> Mask:
-        """Which rows the fit looks at."""
+        """Mask of the rows that are fitted."""
         return np.ones(self.time.size, dtype=np.bool_) if self.used is None else self.used
 
     @property
     def period(self) -> float:
-        """The usual time between samples, s."""
+        """Median time between samples, s."""
         return float(np.median(np.diff(self.time)))
 
     def signal(self) -> Array:
-        """The drive's signal: the recorded one, or what the controller makes of the recorded position."""
+        """Return the drive's signal: the recorded one, or the controller's output for the recorded position."""
         if self.drive is not None:
             return self.drive
         assert self.reference is not None
@@ -125,20 +125,20 @@ class Experiment:
         return control_signal(self.loop, self.time, self.reference, self.position)
 
     def velocity(self) -> Array:
-        """Velocity over `MEAN_OVER` seconds about every row, rad/s (m/s)."""
+        """Return the velocity averaged over `MEAN_OVER` seconds about every row, rad/s (m/s)."""
         reach = max(1, round(0.5 * MEAN_OVER / self.period))
         low = np.maximum(np.arange(self.time.size) - reach, 0)
         high = np.minimum(np.arange(self.time.size) + reach, self.time.size - 1)
         return (self.position[high] - self.position[low]) / (self.time[high] - self.time[low])
 
     def torque(self, axis: ServoAxis, velocity: Array) -> Array:
-        """Torque on the axis, N·m, with the motor's own constants."""
+        """Return the torque on the axis with the motor's own constants, N·m (N)."""
         gain, loss = axis.drive_gains(self.quantity)
         supply = 1.0 if self.supply is None else self.supply
         return gain * supply * self.signal() - loss * velocity
 
     def start(self) -> tuple[float, float]:
-        """Position and velocity at the begin: a parabola through the first rows, at rest where it does not move."""
+        """Return position and velocity at the start, from a parabola through the first rows; velocity 0 at rest."""
         count = min(15, self.time.size)
         t, q = self.time[:count] - self.time[0], self.position[:count]
         distinct = np.unique(q).size
@@ -150,10 +150,10 @@ class Experiment:
         return float(line[0]), float(line[1])
 
     def split(self, share: float) -> tuple[Experiment, Experiment]:
-        """Most of this experiment, and the whole of it looked at in the rest: the last `share` of its time.
+        """Return most of this experiment to fit, and the last `share` of its time to hold out.
 
-        Where the end is faster than all before, the first `share` is looked at instead: laws are judged at speeds that
-        they were fitted to.
+        If the end is faster than everything before it, the first `share` is held out instead: laws are judged at speeds
+        to which they were fitted.
         """
         first, last = self.time[0], self.time[-1]
         late = self.time >= last - share * (last - first)
@@ -164,11 +164,11 @@ class Experiment:
 
     @property
     def can_begin_later(self) -> bool:
-        """Whether it can be simulated from any row: what a controller has integrated is not recorded."""
+        """Whether it can be simulated from any row: the state of an integrating controller is not recorded."""
         return not self.closed_loop or (self.loop is not None and not self.loop.integrates)
 
     def top_speed(self, rows: Mask) -> float:
-        """The highest mean speed over `WINDOW` seconds in these rows, rad/s (m/s)."""
+        """Return the highest mean speed over `WINDOW` seconds in these rows, rad/s (m/s)."""
         step = max(1, round(WINDOW / self.period))
         q, t = self.position[rows], self.time[rows]
         if q.size <= step:
@@ -176,11 +176,11 @@ class Experiment:
         return float(np.max(np.abs(q[step:] - q[:-step]) / (t[step:] - t[:-step])))
 
     def since(self, row: int) -> Experiment:
-        """Its rows from this one on, at least as many as an experiment needs."""
+        """Return the rows from this one on, at least as many as an experiment needs."""
         return self._cut(slice(min(row, self.time.size - FEWEST), None))
 
     def until(self, rows: int) -> Experiment:
-        """Its first rows, at least as many as an experiment needs."""
+        """Return the first rows, at least as many as an experiment needs."""
         return self._cut(slice(max(rows, FEWEST)))
 
     def _cut(self, rows: slice) -> Experiment:
@@ -189,12 +189,12 @@ class Experiment:
 
 
 def insist_on_motion(experiments: Sequence[Experiment]) -> None:
-    """Refuse records that say nothing of an axis.
+    """Refuse records without motion or drive signal.
 
     Raises
     ------
     InputError
-        If there is none, nothing moves in any of them, or the drive's signal is 0 in those that move.
+        If there is no record, no record moves, or the drive's signal is 0 in those that move.
     """
     if not experiments:
         raise InputError("no record; give at least one")
@@ -214,7 +214,7 @@ def insist_on_motion(experiments: Sequence[Experiment]) -> None:
 
 
 def evened(time: Array) -> Array:
-    """The times; of evenly spaced samples whose times were rounded as they were written, those that were rounded."""
+    """Return the times; rounded times of evenly spaced samples are made even."""
     if evenly_spaced(time):
         return time
     even: Array = np.linspace(float(time[0]), float(time[-1]), time.size, dtype=np.float64)
@@ -222,7 +222,7 @@ def evened(time: Array) -> Array:
 
 
 def evenly_spaced(time: Array) -> bool:
-    """Whether every two samples are as far apart as the others, to a thousandth."""
+    """Return whether all samples are equally far apart, to a thousandth."""
     steps = np.diff(time)
     period = float(np.median(steps))
     return bool(np.max(np.abs(steps - period)) <= SPACING * period)
@@ -231,7 +231,7 @@ def evenly_spaced(time: Array) -> bool:
 def experiment_of(
     record: Record, axis: ServoAxis, *, loop: Loop | None = None, name: str = "", output: str = "torque"
 ) -> Experiment:  # fmt: skip
-    """Take an experiment from a record.
+    """Build an experiment from a record.
 
     Parameters
     ----------
@@ -242,8 +242,8 @@ def experiment_of(
     loop
         As in `Experiment`.
     output : str
-        What the loop's output is where no drive signal is recorded: one of `DRIVE_QUANTITIES`. Times the channel
-        ``supply`` where the record has one: of a voltage the loop then gives the duty cycle.
+        Quantity of the loop's output if no drive signal is recorded: one of `DRIVE_QUANTITIES`. It is multiplied by the
+        channel ``supply`` if the record has one: for a voltage, the loop's output is then the duty cycle.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What the user knew of an axis: numbers that were held, in the words of those that were fitted."""
+"""Values that were given and held fixed, described like the fitted ones."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from stickslip.machines.servo import ServoAxis
 
 
 def held_in(found: Identification, frozen: Iterable[str], values: Mapping[str, float]) -> tuple[Held, ...]:
-    """Every number that was held, each once; none of a law that was not taken.
+    """Return every value that was held fixed, once; none of a law that was not chosen.
 
     Parameters
     ----------
     found : Identification
     frozen : iterable of str
-        Names that the user gave; one of a list means every element, one of a friction both directions.
+        Names given by the user; the name of a list means every element, the name of a friction both directions.
     values : mapping of str to float
-        Their values, as far as the user gave them.
+        Their values, where the user gave them.
     """
     known: object = found.details.get("axis")
     axis = known if isinstance(known, ServoAxis) else ServoAxis()
@@ -33,7 +33,7 @@ def held_in(found: Identification, frozen: Iterable[str], values: Mapping[str, f
 
 
 def of_law(found: Identification, axis: ServoAxis, name: str) -> Iterator[Held]:
-    """A parameter of the law, its elements and directions."""
+    """Yield a held parameter of the law, with its elements and directions."""
     described = {f.name: f.par for f in found.model.law.fields} if found.model else {}
     for own, value in found.assumed.items():
         base = own.partition("[")[0]
@@ -42,9 +42,9 @@ def of_law(found: Identification, axis: ServoAxis, name: str) -> Iterator[Held]:
 
 
 def of_axis(axis: ServoAxis, name: str, values: Mapping[str, float]) -> Iterator[Held]:
-    """A number of the axis beside its friction."""
+    """Yield a held number of the axis other than friction."""
     for p in mechanics_parameters(axis, "torque", values, 0, 0):
         if p.name == name:
-            # What a drive's signal is counted in, the record says.
+            # The record's drive quantity determines their unit.
             unit = "" if name in ("drive_gain", "back_emf") else p.par.unit
             yield Held(name, unit, p.par.symbol, p.value)

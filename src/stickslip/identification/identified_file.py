@@ -1,4 +1,4 @@
-"""What a model.toml says besides the law: estimates, correlation, axis, and the records it comes from."""
+"""Contents of a model.toml besides the law: estimates, correlation, axis, and the records it comes from."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """An identified law as its file holds it.
+    """An identified law with the other contents of its file.
 
     Attributes
     ----------
     path : Path
-        Of the file; only a name where there is none.
+        Path of the file; only a name if no file was written.
     model : Model
     estimates : tuple of Estimate
-        Empty in a file that a person wrote.
+        Empty in a file written by hand.
     correlation : array, shape (n, n)
     axis : mapping
-        ``inertia`` and the like where the method found them.
+        ``inertia`` and other numbers of the axis that the method determined.
     motion : str
         "rotary" or "linear".
     data : tuple of mapping
-        ``file``, ``sha256``, ``rows``, ``sample_time`` (s, between its rows), ``position_step`` (rad or m, of its
-        encoder or its digits) of every record.
+        ``file``, ``sha256``, ``rows``, ``sample_time`` (s, between its rows), ``position_step`` (rad or m, encoder step
+        or rounding) of every record.
     misfit : mapping of str to float
     trajectory : Motion or None
-        The motion of the record that it was identified on.
+        The motion of the record on which it was identified.
     speeds : mapping of str to array
-        Quantiles (0, 0.1, ..., 1) of the recorded speeds, rad/s: "positive" and "negative"; empty where not known.
+        Quantiles (0, 0.1, ..., 1) of the recorded speeds, rad/s: "positive" and "negative"; empty if unknown.
     law_file : str
-        Path of the law's file; empty where the law is registered.
+        Path of the law's file; empty if the law is registered.
     train : TwoInertias or None
-        Motor and load behind a spring, where the record told them.
+        Motor and load behind a spring, if the record determined them.
     """
 
     path: Path
@@ -67,12 +67,12 @@ class Identified:
     train: TwoInertias | None = None
 
     def unit(self, angular: str) -> str:
-        """A unit of the angular system in the axis's own."""
+        """Return a unit of the angular system in the axis's own system."""
         return angular if self.motion == "rotary" else in_linear_units(angular)
 
     @property
     def sampled(self) -> tuple[float, str]:
-        """Shortest time between rows of its records, s, and the file of that record; 0 and "" where it is not told."""
+        """Shortest time between rows of its records, s, and that record's file; 0 and "" if it is unknown."""
         return min(self._of_records("sample_time"), default=(0.0, ""))
 
     @property
@@ -81,7 +81,7 @@ class Identified:
         return max(self._of_records("position_step"), default=(0.0, ""))
 
     def _of_records(self, name: str) -> list[tuple[float, str]]:
-        """A positive number of every record that has it, each with the record's file."""
+        """Return a positive number of every record that has it, each with the record's file."""
         return [
             (float(value), str(d.get("file", "")))
             for d in self.data
@@ -90,25 +90,25 @@ class Identified:
 
     @property
     def law_estimates(self) -> tuple[tuple[Estimate, ...], Array]:
-        """The estimates that are the law's own, and their correlation."""
+        """The estimates of the law's own parameters, and their correlation."""
         names = {f.name for f in self.model.law.fields}
         places = [i for i, e in enumerate(self.estimates) if e.name.partition("[")[0] in names]
         return tuple(self.estimates[i] for i in places), self.correlation[np.ix_(places, places)]
 
 
 def read_identified(path: str | os.PathLike[str]) -> Identified:
-    """Read what `stickslip.identification.model_file.write_model` wrote.
+    """Read a file written by `stickslip.identification.model_file.write_model`.
 
     Raises
     ------
     InputError
-        If there is no such file, it is no model, or its tables are damaged.
+        If there is no such file, it is not a model, or its tables are damaged.
     """
     return identified_in(read_toml(Path(path)))
 
 
 def identified_in(table: Table) -> Identified:
-    """As `read_identified`, of a file's content."""
+    """Read a file's content like `read_identified`."""
     file = Path(table.document.name)
     model = Model.from_table(table)
     content = table.values
@@ -151,7 +151,7 @@ def identified_in(table: Table) -> Identified:
 
 
 def _table(content: Mapping[str, Any], name: str, file: Path) -> dict[str, Any]:
-    """A table of a model's file; empty if it has none."""
+    """Return a table of a model's file; empty if it has none."""
     value: Any = content.get(name, {})
     if not isinstance(value, dict):
         raise InputError(
@@ -161,7 +161,7 @@ def _table(content: Mapping[str, Any], name: str, file: Path) -> dict[str, Any]:
 
 
 def _tables(content: Mapping[str, Any], name: str, file: Path) -> list[dict[str, Any]]:
-    """A list of tables of a model's file; empty if it has none."""
+    """Return a list of tables of a model's file; empty if it has none."""
     value: Any = content.get(name, [])
     if not isinstance(value, list) or not all(isinstance(e, dict) for e in cast("list[Any]", value)):
         raise InputError(
@@ -171,7 +171,7 @@ def _tables(content: Mapping[str, Any], name: str, file: Path) -> list[dict[str,
 
 
 def covariance(estimates: tuple[Estimate, ...], correlation: Array, logarithmic: list[bool]) -> Array:
-    """Covariance of the estimates, of the logarithms of those that are said to be."""
+    """Return the covariance of the estimates, of their logarithms where `logarithmic`."""
     from stickslip.identification.monte_carlo import log_spread
 
     std = np.array([

@@ -1,4 +1,4 @@
-"""Which law an axis has: every law is fitted to one part of the records, and judged by what it lacks on the rest."""
+"""Choice of the law: every candidate is fitted to one part of the records and scored on the rest."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from stickslip.models.model import Model
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BLOCKS = 20
-"""Stretches of what is held out, whose scores differ by chance."""
+"""Blocks of the held-out data, whose scores vary by chance."""
 HELD_OUT = 0.3
-"""Last part of every record that is held out where no validation record is given."""
+"""Last part of every record, held out if no validation record is given."""
 COMPARABLE = 1e-2
-"""Relative decrease of the sum of squares at which the output errors that are compared end: laws differ by more."""
+"""Relative decrease of the sum of squares at which a comparing output-error fit stops: laws differ by more."""
 SEARCH = 30
-"""Simulations of a search for the comparison."""
+"""Most simulations of a search in the comparison."""
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,15 @@ class Candidate:
     ----------
     law : str
     parameters : int
-        Free ones.
+        Number of free parameters.
     held_out : mapping of str to float
         Errors on data that were not fitted.
     score : array
-        Mean squared misfit of each block of held-out data, over weights common to all laws.
+        Mean squared misfit of each block of held-out data, under weights common to all laws.
     start : mapping
-        The values fitted: where the fit to all data starts.
+        The fitted values: starting values of the fit to all data.
     failure : str
-        Why it could not be fitted; empty otherwise.
+        Reason why it could not be fitted; empty otherwise.
     """
 
     law: str
@@ -67,7 +67,7 @@ class Candidate:
 def hold_out(
     experiments: Sequence[Experiment], validation: Sequence[Experiment]
 ) -> tuple[list[Experiment], list[Experiment]]:
-    """What laws are fitted to, and what they are compared on."""
+    """Return the experiments to fit and those to compare laws on."""
     if validation:
         return list(experiments), list(validation)
     pairs = [t.split(HELD_OUT) for t in experiments]
@@ -78,18 +78,18 @@ def compare_laws(
     evidence: Evidence, held: Sequence[Experiment], laws: Sequence[Law], asked: Asked,
     progress: Callable[[str], None] = silent,
 ) -> list[Candidate]:  # fmt: skip
-    """Fit every law to slow motion and look at the torque that it lacks on the held-out data.
+    """Fit every law to slow motion and score the torque that it lacks on the held-out data.
 
     Parameters
     ----------
     evidence : Evidence
         Its experiments are fitted.
     held : sequence of Experiment
-        Only the rows that count are judged.
+        Only the rows that count are scored.
     laws : sequence of Law
     asked : Asked
     progress : callable
-        Is told which law begins.
+        Called with the name of each law as its fit starts.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def compare_laws(
     failures = {name: result for name, result in searches.items() if isinstance(result, str)}
     if not found:
         raise InputError("; ".join(failures.values()))
-    # Weighted for all as by the law that lacks least where it was fitted.
+    # The weights of the law with the smallest fitted residual apply to all.
     criterion, u = min(found.values(), key=lambda f: robust_std(replace(f[0], whitening=FIRST).white(f[1])))
     weights = criterion.adapted(u)
     seen, level = [motion_of(t) for t in held], abs(start_beside(evidence).coulomb)
@@ -127,9 +127,9 @@ def judged(
     law: Law, criterion: Criterion, u: Array, weights: Criterion, held: Sequence[Experiment], motions: Sequence[Motion],
     friction: float,
 ) -> Candidate:  # fmt: skip
-    """What one law, fitted, lacks on the held-out data, with the weights common to all."""
+    """Score a fitted law by the torque that it lacks on the held-out data, under the common weights."""
     inertia = criterion.vector.named(u)["inertia"]
-    # What is held out acts when it acted already.
+    # The held-out drive signals are already aligned with the time at which they acted.
     vector = held_elsewhere(criterion.vector, DELAY, -0.5 * held[0].period)
     own = replace(weights, law=law, vector=vector, mechanics=criterion.mechanics, prior=None)
     squares = np.concatenate([
@@ -146,12 +146,12 @@ def judged(
 
 
 def failed(law: Law, why: str) -> Candidate:
-    """A law that could not be fitted."""
+    """Return a candidate that could not be fitted."""
     return Candidate(law.name, 0, {}, np.full(BLOCKS, math.inf), {}, why)
 
 
 def lacking(criterion: Criterion, record: Prepared, u: Array, experiment: Experiment) -> Array:
-    """Squares of the corrections of one experiment in scales, outliers weighed, in the rows that count."""
+    """Return the squared corrections of one experiment, scaled and outlier-weighted, in the rows that count."""
     time = record.course.drive.time[record.edge : -record.edge : record.stride]
     counts = np.interp(
         time[criterion.whitening.size - 1 :], experiment.time, experiment.rows.astype(np.float64)
@@ -163,7 +163,7 @@ def compare_by_output(
     fitted: Sequence[Experiment], held: Sequence[Experiment], axis: ServoAxis, laws: Sequence[Law],
     inverse: InverseDynamics | None, asked: Asked, progress: Callable[[str], None] = silent,
 ) -> list[Candidate]:  # fmt: skip
-    """The same by the output error of the simulation, for records without the drive's signal."""
+    """Compare laws by the simulation's output error, for records without the drive's signal."""
     out: list[Candidate] = []
     weights: Mapping[str, float] | None = None
     for number, law in enumerate(laws, 1):
@@ -187,7 +187,7 @@ def compare_by_output(
 
 
 def asked_of(law: Law, asked: Asked, laws: Sequence[Law]) -> Asked:
-    """What is asked without what belongs to another of the laws only: to name that is no mistake."""
+    """Return the request without names that only other candidate laws have; naming those is no mistake."""
     own = {f.name for f in law.fields}
     others = {f.name for x in laws for f in x.fields} - own
 
@@ -201,13 +201,13 @@ def asked_of(law: Law, asked: Asked, laws: Sequence[Law]) -> Asked:
 
 
 def values_of(vector: Vector, u: Array, model: Model) -> dict[str, Any]:
-    """The law's values of a fit, those of elements as lists."""
+    """Return a fit's values of the law's parameters, those of elements as lists."""
     law = model.as_dict()
     return {f.name: law[f.name] for f in model.law.fields}
 
 
 def choose(candidates: Sequence[Candidate]) -> int:
-    """Place of the law with the fewest parameters within a standard error of the best (Hastie et al. 2009, 7.10)."""
+    """Return the index of the law with the fewest parameters within one SE of the best (Hastie et al. 2009, 7.10)."""
     means = [float(np.mean(c.score)) for c in candidates]
     best = int(np.nanargmin(means))
     near = [best]
@@ -222,7 +222,7 @@ def choose(candidates: Sequence[Candidate]) -> int:
 
 
 def note_on(candidates: Sequence[Candidate], chosen: str) -> str:
-    """What the comparison showed, in a sentence."""
+    """Return the comparison's result as a sentence."""
     parts = [
         f"{c.law} {'failed' if c.failure else f'{math.sqrt(float(np.mean(c.score))):.3g}'}"
         for c in candidates

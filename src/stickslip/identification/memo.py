@@ -1,4 +1,4 @@
-"""Sliding estimated once: the doctor's and the identification's of a record are the same."""
+"""A memo of the sliding estimate, which the doctor and the identification share for one record."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ EstimateSliding = Callable[..., SlidingPosterior]
 
 
 class SlidingMemo:
-    """`estimate_sliding`, with its results kept by the content of what it reads, for as long as this object is."""
+    """`estimate_sliding` with results kept by the content of its inputs, for the lifetime of this object."""
 
     def __init__(self) -> None:
         self._found: dict[bytes, SlidingPosterior] = {}
@@ -23,7 +23,7 @@ class SlidingMemo:
     def __call__(
         self, experiments: Sequence[Experiment], axis: ServoAxis, asked: Asked | None = None
     ) -> SlidingPosterior:
-        """As `estimate_sliding`, with its parameters and errors."""
+        """Return the result of `estimate_sliding`, with its parameters and errors."""
         asked = asked or Asked(pendulum=axis.gravity == "pendulum")
         key = _content(experiments, axis, asked)
         if key not in self._found:

@@ -1,4 +1,4 @@
-"""The mixture over what the searches found: members, their numbers and how far scores exceed their covariances."""
+"""The mixture over the combinations that the searches found, with widths that scores summed by cluster correct."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from stickslip.identification.search import Asked, Fit
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 REACH, MOST_SETS = 6.0, 40
-"""Log evidence below the best within which a combination is in the mixture; and how many of them at most."""
+"""Log evidence below the best within which a combination enters the mixture; and the greatest number of them."""
 FALL_REACH = 9.0
-"""The same for friction's fall."""
+"""Log evidence below the best within which a fall of friction enters the mixture."""
 NEGLIGIBLE = 1e-5
-"""Of the largest weight: members below are left out."""
+"""Part of the largest weight below which members are left out."""
 SPEEDS = 6
-"""Speeds, from the slowest sliding to the fastest, at which the friction curve is handed on."""
+"""Number of speeds, from the slowest sliding to the fastest, at which the friction curve is passed on."""
 STATES = np.linspace(-0.8, 0.8, 7)
-"""Borders of speed and acceleration, over their largest, between states whose scores are summed."""
+"""Borders of speed and acceleration, relative to their largest, between states whose scores are summed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class Member:
     on : frozenset of str
         Alternatives that are present.
     vs, exponent : float
-        Of friction's fall; not a number where there is none.
+        Parameters of friction's fall; NaN if there is none.
     """
 
     weight: float
@@ -59,7 +59,7 @@ class Readout:
     ----------
     names : tuple of str
     rows : array, shape (k, p)
-        Of the coefficients but those of friction's fall.
+        Combinations of all coefficients except those of friction's fall.
     way, speed : array, shape (k,)
         Of a steady torque: 1 forward, -1 backward, 0 for other numbers; and its speed. Of friction at rest: 1 and 0.
     """
@@ -71,7 +71,7 @@ class Readout:
 
     @staticmethod
     def of(posterior: Posterior, asked: Asked, speeds: Array) -> Readout:
-        """That of one posterior; steady torques at some speeds are among the numbers."""
+        """Return the readout of one posterior; steady torques at some speeds are among its numbers."""
         core, level = posterior.core.names, posterior.level
         blocks = {a.name: b for a, b in zip(posterior.alternatives, posterior.blocks, strict=True)}
         unit = np.eye(posterior.count)
@@ -109,14 +109,14 @@ class Readout:
         )
 
     def fall(self, vs: float, exponent: float) -> Array:
-        """Combinations of the coefficients of friction's fall, shape (k, 2); 0 where there is none."""
+        """Return the combinations of the coefficients of friction's fall, shape (k, 2); 0 if there is none."""
         left = np.exp(-((self.speed / vs) ** exponent)) if np.isfinite(vs) else np.zeros(self.speed.size)
         return np.column_stack([self.way * left, np.zeros(left.size)])
 
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """Members, best start first.
+    """A mixture, its best start first.
 
     Attributes
     ----------
@@ -126,10 +126,10 @@ class Mixture:
         rad/s (m/s), of the steady torques.
     head : Fit
     posterior : Posterior
-        Of the likeliest member's start.
+        Posterior of the likeliest member's start.
     family : Family
     place : int
-        The likeliest member's.
+        Index of the likeliest member in `family`.
     """
 
     names: tuple[str, ...]
@@ -142,9 +142,9 @@ class Mixture:
 
 
 def mix(rows: SlidingRows, fits: Sequence[Fit], asked: Asked) -> Mixture:
-    """Every combination within reach of the best of each start, under the mean of all their variances.
+    """Mix the combinations within reach of the best of each start, under the mean of all their variances.
 
-    Evidence under different weights could not be compared.
+    Evidence under different weights is not comparable.
     """
     weight = len(fits) / np.sum([1.0 / f.noise.weight for f in fits], axis=0)
     speeds = np.geomspace(max(rows.slowest, 1e-3 * rows.fastest), rows.fastest, SPEEDS)
@@ -177,7 +177,7 @@ def mix(rows: SlidingRows, fits: Sequence[Fit], asked: Asked) -> Mixture:
 
 
 def with_disturbance(member: Member, bias: Array) -> tuple[Member, Member]:
-    """Return a member without a disturbance and one with it: any part of the bias is then as likely as another."""
+    """Return a member without a disturbance and one with it, in which every part of the bias is equally likely."""
     covariance = member.covariance + np.outer(bias, bias) / 12.0
     disturbed = replace(
         member,
@@ -194,11 +194,11 @@ def members_of(
     fit: Fit, posterior: Posterior, readout: Readout, family: Family, places: Any, total: float, least: float,
     asked: Asked, factor: Array,
 ) -> Iterator[Member]:  # fmt: skip
-    """The members of a family whose log weight is no less than `least`."""
+    """Yield the members of a family whose log weight is at least `least`."""
     names, scale = readout.names, np.outer(factor, factor)
     base = readout.rows @ family.base @ readout.rows.T
     on = frozenset(a.name for a, k in zip(posterior.alternatives, family.on, strict=True) if k)
-    # Of the friction at rest the way is 1 as well, but what splits fc is in it already.
+    # The direction of friction at rest is 1 as well, but its fc already includes the split.
     steady = np.where(readout.speed > 0.0, readout.way, 0.0)
     known = [names.index(n) for n in asked.known if n in names]
     falls = posterior.falls
@@ -229,14 +229,14 @@ def members_of(
 
 
 class Response(NamedTuple):
-    """How the numbers of the likeliest member respond to its misfit.
+    """Response of the likeliest member's numbers to its misfit.
 
     Attributes
     ----------
     residual : array, shape (n,)
-        Torque that it does not explain.
+        Torque that the member does not explain.
     columns : array, shape (n, p)
-        Of its coefficients, those of the fall last.
+        Columns of its coefficients, those of the fall last.
     gain : array, shape (k, p)
         Change of the numbers with ``columns.T @ (weight * residual)``.
     std : array, shape (k,)
@@ -250,7 +250,7 @@ class Response(NamedTuple):
 
 
 def response_of(fit: Fit, posterior: Posterior, readout: Readout, family: Family, place: int) -> Response:
-    """Return how the numbers of one member respond to its misfit."""
+    """Return the response of a member's numbers to its misfit."""
     columns, covariance, combined = posterior.matrix, family.base, readout.rows
     if place:
         falls = posterior.falls
@@ -265,7 +265,7 @@ def response_of(fit: Fit, posterior: Posterior, readout: Readout, family: Family
 
 
 def inflation(rows: SlidingRows, response: Response, weight: Array) -> Array:
-    """By how much standard deviations from scores summed by stroke, or by state, exceed the posterior's, shape (k,)."""
+    """Return the ratio of standard deviations from scores summed by stroke or state to the posterior's, shape (k,)."""
     score = (response.columns * (weight * response.residual)[:, None]) @ response.gain.T
     state = np.digitize(rows.velocity / rows.largest[0], STATES) * (STATES.size + 1)
     state = (state + np.digitize(rows.acceleration / rows.largest[1], STATES)) * len(rows.blocks) + rows.block

@@ -1,4 +1,4 @@
-"""model.toml: an identified law with its axis, intervals, correlation, and where it comes from.
+"""model.toml: an identified law with its axis, intervals, correlation and the records it comes from.
 
 `stickslip.models.model.Model.from_file` reads the law back; a study or simulation names it by
 ``law = {model = "model.toml"}``. Numbers are in SI units; those of a linear axis in N and m.
@@ -43,14 +43,14 @@ def write_model(
     Parameters
     ----------
     path : path
-        Of the file, usually ``model.toml``.
+        Path of the file, usually ``model.toml``.
     found : Identification
     data : sequence of mapping
-        One per record: ``file``, ``sha256``, ``rows``, what is known.
+        One per record: ``file``, ``sha256``, ``rows`` and other known data.
     law : str
-        How the law is found again if not by its name: the path of its file.
+        Path of the law's file, if the law is not found by its name.
     more : mapping, optional
-        Further tables; what they say of the axis goes to its table.
+        Further tables; their ``axis`` is merged into the axis's table.
 
     Raises
     ------
@@ -66,21 +66,21 @@ def write_model(
 def model_content(
     found: Identification, data: Sequence[Mapping[str, Any]], law: str = "", more: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:  # fmt: skip
-    """All that `write_model` writes, as plain data; `law` as the file shall name it."""
+    """Return all that `write_model` writes, as plain data; `law` is written as given."""
     content, further = model_data(found, data, law), dict(more or {})
     axis = content.get("axis", {}) | dict(further.get("axis", {}))
     return content | further | ({"axis": axis} if axis else {})
 
 
 def in_memory(content: Mapping[str, Any]) -> Table:
-    """The table that reading such a file gives, where none is written; the law's path must be absolute."""
+    """Return the table that reading such a file gives, without a file; the law's path must be absolute."""
     import tomli_w
 
     return Table(tomllib.loads(tomli_w.dumps(content)), Document("model.toml", Path()))
 
 
 def _relative(law: str, target: Path) -> str:
-    """The path of a law's file as seen from the model's folder."""
+    """Return the path of a law's file relative to the model's folder."""
     if not law.endswith(".py"):
         return law
     return Path(
@@ -89,7 +89,7 @@ def _relative(law: str, target: Path) -> str:
 
 
 def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: str = "") -> dict[str, Any]:
-    """The content of the file as plain data."""
+    """Return the content of the file as plain data."""
     the_map: Any = found.details.get("map")
     if found.model is None and not isinstance(the_map, PositionMap):
         raise InputError(f"{found.method} yields no whole law, so there is no model to write")
@@ -135,13 +135,13 @@ def model_data(found: Identification, data: Sequence[Mapping[str, Any]], law: st
 
 
 def told_train(found: Identification) -> TwoInertias | None:
-    """Motor and load behind a spring, where the records told them."""
+    """Return motor and load behind a spring, if the records determined them."""
     sliding: Any = found.details.get("sliding")
     return two_inertias(sliding) if isinstance(sliding, SlidingPosterior) else None
 
 
 def _law(model: Model, law: str) -> dict[str, Any]:
-    """Its name, parameters and choices."""
+    """Return the law's name, parameters and choices."""
     plain = model.as_dict()
     names = {f.name for f in model.law.fields}
     choices = {k: v for k, v in plain.items() if k not in names and k != "law"}
@@ -150,7 +150,7 @@ def _law(model: Model, law: str) -> dict[str, Any]:
 
 
 def _estimate(e: Estimate) -> dict[str, Any]:
-    """TOML has inf and nan, so that every number stays one."""
+    """Return an estimate as a TOML table; TOML has inf and nan, so every number stays one."""
     return {
         "name": e.name, "unit": e.unit, "value": float(e.value), "std": float(e.std), "lower": float(e.lower),
         "upper": float(e.upper), "identified": bool(e.identified), **({"verdict": e.verdict} if e.verdict else {}),
@@ -158,7 +158,7 @@ def _estimate(e: Estimate) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Versions of all that takes part in the numbers."""
+    """Return the versions of all software that affects the numbers."""
     import stickslip
 
     found = {"stickslip": stickslip.__version__, "python": platform.python_version()}

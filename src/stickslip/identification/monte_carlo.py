@@ -1,4 +1,4 @@
-"""Parameters drawn from what an identification says of them: bands around curves, plants that may be the true one."""
+"""Parameters drawn from the uncertainty of an identification: bands around curves, and plants for robustness tests."""
 
 from __future__ import annotations
 
@@ -16,23 +16,24 @@ from stickslip.simulation.prescribed.steady import Steady
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WIDEST = math.log(3.0)
-"""Largest standard deviation of the logarithm of a positive parameter: the data say no more than its order."""
+"""Largest standard deviation of a positive parameter's logarithm: the data then determine only its order of
+magnitude."""
 PER_STD = 3.92
 """Width of a 95 % interval in standard deviations."""
 
 
 def draw_values(estimates: Sequence[Estimate], correlation: Array, count: int, seed: int = 0) -> Array:
-    """Draw values of all estimates, shape (count, n); those without a spread stay at their value.
+    """Draw values of all estimates, shape (count, n); those without a spread keep their value.
 
-    Positive ones are drawn log-normally, with the standard deviation that their 95 % interval has: to each side its own
-    where the data do not tell them from 0.
+    Positive ones are drawn log-normally, with the standard deviation of their 95 % interval; if the interval contains
+    0, each side has its own.
     """
     z: Array = np.random.default_rng(seed).standard_normal((count, len(estimates)))
     return spread_values(estimates, correlation, z)
 
 
 def spread_values(estimates: Sequence[Estimate], correlation: Array, z: Array) -> Array:
-    """What independent standard normal numbers `z`, shape (count, n), are as values of the estimates."""
+    """Return values of the estimates for independent standard normal numbers `z`, shape (count, n)."""
     n = len(estimates)
     known = np.where(np.isfinite(correlation), correlation, np.eye(n)) if correlation.size else np.eye(n)
     known = 0.5 * (known + known.T)
@@ -47,7 +48,7 @@ def spread_values(estimates: Sequence[Estimate], correlation: Array, z: Array) -
             out[:, i] = e.value * np.exp(np.where(z[:, i] > 0.0, above, WIDEST) * z[:, i])
         else:
             out[:, i] = e.value + (e.std if math.isfinite(e.std) else 0.0) * z[:, i]
-    # The shares of GMS's elements add up to 1 (thesis eq. 2.19), and the law refuses others.
+    # The shares of GMS's elements add up to 1 (thesis eq. 2.19); the law refuses others.
     shares = [i for i, e in enumerate(estimates) if e.name.startswith("alpha[")]
     if shares and math.isclose(math.fsum(estimates[i].value for i in shares), 1.0, abs_tol=1e-6):
         out[:, shares] /= np.sum(out[:, shares], axis=1, keepdims=True)
@@ -55,7 +56,7 @@ def spread_values(estimates: Sequence[Estimate], correlation: Array, z: Array) -
 
 
 def log_spread(e: Estimate) -> float:
-    """Standard deviation of the logarithm of a positive parameter."""
+    """Return the standard deviation of a positive parameter's logarithm."""
     if math.isfinite(e.upper):
         return min(math.log(e.upper / e.lower) / PER_STD, WIDEST)
     return min(e.std / e.value, WIDEST) if math.isfinite(e.std) else WIDEST
@@ -65,10 +66,10 @@ def draw_models(
     model: Model, estimates: Sequence[Estimate], correlation: Array, count: int, seed: int = 0,
     plausible: Callable[[dict[str, float]], None] = lambda named: None,
 ) -> list[tuple[Model, Mapping[str, float]]]:  # fmt: skip
-    """Laws whose parameters are drawn, each with all drawn values by name.
+    """Draw models, each with all drawn values by name.
 
-    Draws that the law refuses are left out; an element ``k[1]`` of a list is put in its place. `plausible` may change
-    drawn values, before there is a law of them.
+    Draws that the law refuses are left out; an element ``k[1]`` of a list replaces that element. `plausible` may change
+    drawn values before the law is built.
     """
     names = [e.name for e in estimates]
     out: list[tuple[Model, Mapping[str, float]]] = []
@@ -83,7 +84,7 @@ def draw_models(
 
 
 def with_values(model: Model, named: Mapping[str, float]) -> Model:
-    """The model with other values of those parameters that are its own."""
+    """Return the model with other values of those parameters that are its own."""
     values: dict[str, Any] = {
         k: list(v) if isinstance(v, tuple) else v  # type: ignore[reportUnknownArgumentType]
         for k, v in model.parameters._asdict().items()
@@ -103,7 +104,7 @@ def with_values(model: Model, named: Mapping[str, float]) -> Model:
 
 
 def resisting_torque(model: Model, velocity: Array) -> Array:
-    """Torque at constant velocities (break-away at 0, towards the positive side), N·m, shape (n,)."""
+    """Return the torque at constant velocities (break-away at 0, towards the positive side), N·m, shape (n,)."""
     side = np.where(velocity < 0.0, -1.0, 1.0)
     return Steady(model.law, velocity, side).torque(np.asarray(model.law.pack(model.parameters), np.float64))
 
@@ -111,7 +112,7 @@ def resisting_torque(model: Model, velocity: Array) -> Array:
 def curve_band(
     model: Model, estimates: Sequence[Estimate], correlation: Array, velocity: Array, count: int = 200, seed: int = 0
 ) -> Array:  # fmt: skip
-    """Torque at constant velocities of drawn laws, shape (draws, velocities): percentiles of it make a band."""
+    """Return the torque of drawn laws at constant velocities, shape (draws, velocities); percentiles make a band."""
     steady = Steady(model.law, velocity, np.where(velocity < 0.0, -1.0, 1.0))
     drawn = draw_models(model, estimates, correlation, count, seed)
     curves = [steady.torque(np.asarray(m.law.pack(m.parameters), np.float64)) for m, _ in drawn]

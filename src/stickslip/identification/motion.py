@@ -1,8 +1,8 @@
-"""The motion that a setting is tried along: that of a log, one of a file, or a slow sinusoid.
+"""The motion along which a setting is tested: that of a log, one of a file, or a slow sinusoid.
 
-`identify` keeps the motion of its first record in ``[trajectory]`` of model.toml: up to `POINTS` points of the
-reference (of the position, where the log has none), joined by cubics, of the `LONGEST` seconds with the most motion and
-reversals. A setting can then be tried without the log.
+`identify` stores the motion of its first record in ``[trajectory]`` of model.toml: up to `POINTS` points of the
+reference (of the position, if the log has none), joined by cubics, from the `LONGEST` seconds with the most motion and
+reversals. A setting can then be tested without the log.
 """
 
 from __future__ import annotations
@@ -22,32 +22,33 @@ from stickslip.core.record import Record
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LONGEST = 8.0
-"""s of a log that are kept."""
+"""Longest part of a log that is stored, s."""
 POINTS = 800
-"""At most so many are kept."""
+"""Most points that are stored."""
 RUN_UP = 0.1
-"""s, in which a motion that begins (or ends) under way is brought from (or to) rest."""
+"""Duration of the ramp from (or to) rest of a motion that starts (or ends) under way, s."""
 HOLD = 1.0
-"""s at rest after the motion, of which the second half is judged."""
+"""Time at rest after the motion, s, of which the second half is scored."""
 STEEPEST = 3.0
-"""Times the mean velocity between two points, that a cubic may have at either without going back in between."""
+"""Greatest slope of a cubic at a point, as a multiple of the mean velocity between its two points, without
+overshoot."""
 REST = 0.01
-"""Of the greatest speed, below which a motion's end is at rest."""
+"""Part of the greatest speed below which a motion's start or end is at rest."""
 WINDOW = 0.02
-"""s over which a recorded speed is taken."""
+"""Averaging time of a recorded speed, s."""
 REFERENCES = ("position_reference", "reference")
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Points of a motion, joined by cubic Hermite pieces.
+    """A motion as points joined by cubic Hermite pieces.
 
     Attributes
     ----------
     time, position, velocity : array, shape (n,)
-        s, ascending; rad; rad/s.
+        s, increasing; rad; rad/s.
     source : str
-        For people: where it comes from.
+        Origin of the motion, as text.
     """
 
     time: Array
@@ -73,22 +74,24 @@ class Motion:
 
     @property
     def duration(self) -> float:
-        """s"""
+        """Duration, s."""
         return float(self.time[-1] - self.time[0])
 
     @property
     def amplitude(self) -> float:
-        """Half the way between its outermost positions, rad."""
+        """Half the distance between its outermost positions, rad."""
         return 0.5 * float(np.ptp(self.position))
 
     @property
     def top_speed(self) -> float:
-        """rad/s"""
+        """Greatest speed, rad/s."""
         return float(np.max(np.abs(self.velocity)))
 
     def sampled(self, sample_time: float) -> Array:
-        """Position, velocity and acceleration at every sample, shape (n, 3): from rest at 0, and `HOLD` at rest
-        after it."""
+        """Return position, velocity and acceleration at every sample, shape (n, 3).
+
+        The motion starts from rest at 0 and is followed by `HOLD` seconds at rest.
+        """
         interpolate: Any = importlib.import_module("scipy.interpolate")
         time, position, velocity = self._from_rest_to_rest()
         velocity = without_overshoot(time, position, velocity)
@@ -100,7 +103,7 @@ class Motion:
         return out
 
     def _from_rest_to_rest(self) -> tuple[Array, Array, Array]:
-        """The points, with a ramp of the velocity before and behind where the motion does not begin or end at rest."""
+        """Return the points, with a ramp of the velocity where the motion does not start or end at rest."""
         t, x, v = self.time, self.position, self.velocity.copy()
         for end in (0, -1):
             v[end] = v[end] if abs(v[end]) > REST * self.top_speed else 0.0
@@ -113,7 +116,7 @@ class Motion:
         return t, x, v
 
     def table(self) -> dict[str, Any]:
-        """Plain data for a file."""
+        """Return plain data for a file."""
         span, top = float(np.ptp(self.position)), self.top_speed or 1.0
         return {
             "source": self.source,
@@ -124,11 +127,11 @@ class Motion:
 
 
 def without_overshoot(time: Array, position: Array, velocity: Array) -> Array:
-    """The velocities at the points, rad/s, lowered where the cubics would go back between two points.
+    """Return the velocities at the points, rad/s, lowered where a cubic would go back between two points.
 
-    A velocity taken over a few milliseconds is too high where a motion begins or ends: the cubic then passes the place
-    of rest and comes back, by as much as a contact's springs bend, and a feedforward answers a reversal that no drive
-    commands. Between velocities to either side the motion turns, and its cubic does so once.
+    A velocity averaged over a few milliseconds is too high where a motion starts or ends: the cubic then overshoots the
+    rest position and returns by as much as a contact's presliding distance, and a feedforward compensates a reversal
+    that was never commanded. Between velocities of opposite sign the motion turns, and its cubic turns once.
     """
     mean, given = np.diff(position) / np.diff(time), np.asarray(velocity, dtype=np.float64)
     while True:
@@ -144,13 +147,13 @@ def without_overshoot(time: Array, position: Array, velocity: Array) -> Array:
 
 
 def _rounded(values: Array, step: float) -> list[float]:
-    """Without digits below a power of ten near `step`."""
+    """Return the values without digits below a power of ten near `step`."""
     digits = -math.floor(math.log10(step))
     return [float(x) for x in np.round(values, digits)]
 
 
 def motion_in(content: Mapping[str, Any], file: str) -> Motion | None:
-    """The motion that a model's file holds; None where it has none.
+    """Return the motion in a model's file; None if it has none.
 
     Raises
     ------
@@ -172,7 +175,7 @@ def motion_in(content: Mapping[str, Any], file: str) -> Motion | None:
 
 
 def motion_of(record: Record, source: str = "") -> Motion:
-    """The motion of a record: its reference, or where it has none its position, smoothed over some rows.
+    """Return the motion of a record: its reference, or if it has none its position, smoothed over some rows.
 
     Raises
     ------
@@ -204,7 +207,7 @@ def motion_of(record: Record, source: str = "") -> Motion:
 
 
 def speeds_of(records: Sequence[Record]) -> dict[str, list[float]]:
-    """Quantiles (0, 0.1, ..., 1) of the recorded speeds in either direction, rad/s, over a fiftieth of a second each.
+    """Return the quantiles (0, 0.1, ..., 1) of the recorded speeds by direction, rad/s, each averaged over `WINDOW`.
 
     Less than a thousandth of the greatest speed is rest.
     """
@@ -232,7 +235,7 @@ def speeds_in(velocity: Array) -> dict[str, list[float]]:
 
 
 def _telling(time: Array, position: Array) -> tuple[float, float]:
-    """Begin and end of the `LONGEST` seconds with the most way and reversals, from a time of rest if there is one."""
+    """Return start and end of the `LONGEST` seconds with the most travel and reversals, from rest if possible."""
     if time.size < 2 or time[-1] - time[0] <= LONGEST:
         return float(time[0]) if time.size else 0.0, float(time[-1]) if time.size else 0.0
     grid = np.arange(time[0], time[-1], 0.02)
@@ -253,7 +256,7 @@ def _telling(time: Array, position: Array) -> tuple[float, float]:
 
 
 def _smoothed(values: Array, rows: int) -> Array:
-    """Running mean over about twice `rows`, shorter at the ends."""
+    """Return the running mean over about twice `rows`, shorter at the ends."""
     width = 2 * rows + 1
     total = np.concatenate([[0.0], np.cumsum(values)])
     index = np.arange(values.size)
@@ -262,7 +265,7 @@ def _smoothed(values: Array, rows: int) -> Array:
 
 
 def sinusoid(amplitude: float, frequency: float) -> Motion:
-    """Two periods of a slow sinusoid that starts at rest at its turning point, rad and Hz."""
+    """Return two periods of a slow sinusoid that starts at rest at its turning point, rad and Hz."""
     t = np.linspace(0.0, 2.0 / frequency, 401)
     w = 2.0 * math.pi * frequency
     velocity = amplitude * w * np.sin(w * t)

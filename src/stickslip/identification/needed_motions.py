@@ -7,7 +7,7 @@ EXPERIMENTS = {
     "fc": "sliding", "vs": "sliding", "sigma2": "sliding", "delta_s": "sliding",
     "sigma1": "stickslip", "c": "stickslip",
 }  # fmt: skip
-"""Procedure of a rig, by parameter."""
+"""Procedure of a rig for each parameter."""
 MOTIONS = {
     "inertia": "accelerations back and forth", "sliding": "constant speeds in both directions, three of them at least",
     "breakaway": "slow ramps of the torque from rest, until it moves",

@@ -1,9 +1,10 @@
-"""How much each row says: its variance, and how many rows say the same.
+"""Weights of the rows: their variance, and the number of rows that carry the same information.
 
-The variance of a row is its block's own, a share of what accelerates, and next to the ends of a stroke what building up
-friction leaves unsure. Heavy tails are met by Student weights (Lange, Little and Taylor 1989). What repeats is no new
-observation: weights are divided by the long-run variance within a stroke, by the design effect of strokes that leave
-the same misfit in the same state (Kish 1965), and bounded where all samples of a window share one count of the column.
+The variance of a row has three parts: its block's own variance, a share proportional to the inertia torque, and near
+the ends of a stroke the uncertainty of friction that builds up. Student weights reduce outliers (Lange, Little and
+Taylor 1989). Repeated misfit is no new observation: weights are divided by the long-run variance within a stroke and by
+the design effect of strokes with the same misfit in the same state (Kish 1965), and bounded if all samples of a window
+share one count of the column.
 """
 
 from __future__ import annotations
@@ -19,16 +20,16 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Integers = np.ndarray[Any, np.dtype[np.int64]]
 
 FREEDOM = 4.0
-"""Of Student's distribution: outliers of a tenth of the rows hardly count."""
+"""Degrees of freedom of Student's distribution: a tenth of the rows may be outliers without much effect."""
 LEAST = 0.001
-"""Of Fc: no torque is known better."""
+"""Least standard deviation of a torque, as a part of Fc."""
 END, WAY = 0.3, 0.003
-"""Part of Fc that is unsure at a stroke's end, and part of the range over which it fades."""
+"""Standard deviation of friction at a stroke's end, part of Fc; distance over which it decays, part of the range."""
 ITERATIONS = 8
 LAGS, UNCORRELATED = 60, 0.05
-"""Rows up to which misfit is correlated at most, and the correlation that is none."""
+"""Greatest lag of the misfit's correlation, rows; correlation below which rows count as independent."""
 CELLS = 8.0
-"""Cells a state's coordinate (speed, acceleration, jerk over its usual size) is divided into."""
+"""Cells per usual size of a state's coordinate (speed, acceleration, jerk)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +39,9 @@ class Noise:
     Attributes
     ----------
     weight : array, shape (n,)
-        Information of a row, one over its variance and over how many rows say the same.
+        Information of a row: one over its variance and over the number of rows with the same information.
     accelerating : float
-        Misfit where the axis accelerates most, N·m (N).
+        Misfit at the greatest acceleration, N·m (N).
     """
 
     weight: Array
@@ -48,15 +49,15 @@ class Noise:
 
 
 def noise_of(rows: SlidingRows, residual: Array, inertia: float, friction: float) -> Noise:
-    """Weights that a residual torque suggests.
+    """Estimate the weights of all rows from a residual torque.
 
     Parameters
     ----------
     rows : SlidingRows
     residual : array, shape (n,)
-        N·m (N)
+        Residual torque, N·m (N).
     inertia, friction : float
-        About those of the axis.
+        Approximate values of the axis.
     """
     weight, highest = np.zeros(residual.size), 0.0
     near_end = rows.at_centres(lambda r: np.minimum(r.since, r.until)) / max(WAY * rows.range, 1e-300)
@@ -79,7 +80,7 @@ def noise_of(rows: SlidingRows, residual: Array, inertia: float, friction: float
 
 
 def _variance(r: Array, extra: Array, push: Array, least: float) -> tuple[float, float, Array]:
-    """Standard deviation of a block, its share of what accelerates, and Student weights of its rows."""
+    """Return a block's standard deviation, its share of the inertia torque, and the Student weights of its rows."""
     size, share = max(1.4826 * float(np.median(np.abs(r))), least), 0.0
     hard = push > np.median(push)
     student = np.ones(r.size)
@@ -97,7 +98,7 @@ def _variance(r: Array, extra: Array, push: Array, least: float) -> tuple[float,
 
 
 def _correlated(z: Array, strokes: Integers) -> float:
-    """How many rows of a stroke say the same: twice at least, since windows overlap."""
+    """Return the number of a stroke's rows that carry the same information: at least 2, since windows overlap."""
     total, count = float(z @ z), 1.0
     for lag in range(1, min(LAGS, z.size // 4)):
         same = strokes[lag:] == strokes[:-lag]
@@ -109,14 +110,14 @@ def _correlated(z: Array, strokes: Integers) -> float:
 
 
 def _states(rows: SlidingRows) -> Integers:
-    """Cell of speed, acceleration and jerk that every row lies in, shape (n,)."""
+    """Return the cell of speed, acceleration and jerk of every row, shape (n,)."""
     scaled = zip((rows.velocity, rows.acceleration, rows.jerk), rows.largest, strict=True)
     cells = np.column_stack([np.floor(CELLS * np.clip(x / size, -1.2, 1.2)) for x, size in scaled])
     return np.unique(cells, axis=0, return_inverse=True)[1].ravel()
 
 
 def _repeated(z: Array, strokes: Integers, state: Integers) -> Array:
-    """How many strokes leave the same misfit in a row's state: 1 + ρ (m - 1) of m strokes, shape (n,)."""
+    """Return the design effect 1 + ρ (m - 1) of m strokes with correlated misfit in a row's state, shape (n,)."""
     cell = np.unique(state, return_inverse=True)[1]
     both = np.unique(np.column_stack([cell, strokes]), axis=0, return_inverse=True)[1].ravel()
     sums, parts, numbers = np.bincount(cell, z), np.bincount(both, z), np.bincount(both)
@@ -130,7 +131,7 @@ def _repeated(z: Array, strokes: Integers, state: Integers) -> Array:
 
 
 def _rounded(block: Block) -> Array:
-    """The most that a row may weigh: rows whose windows see one count of the torque column share its rounding."""
+    """Return the greatest weight of a row: rows whose windows see one count of the torque column share its rounding."""
     step = block.record.torque_step
     if step <= 0.0:
         return np.full(block.centres.size, np.inf)

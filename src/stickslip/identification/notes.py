@@ -1,4 +1,4 @@
-"""What gross sliding shows besides numbers, in sentences: timing, drift, torque over position, alternatives."""
+"""Notes on gross sliding besides the numbers: timing, drift, torque over position, alternatives."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from stickslip.core.messages import Note, name_option
 from stickslip.identification.sliding import PRESENT, SlidingPosterior
 
 KNOWN_DELAY = 0.25
-"""Rows: half-width of a delay up to which it is worth a sentence."""
+"""Greatest half-width of a delay that is reported, rows."""
 SAME_DELAY = 0.1
-"""Rows by which a delay may be off one of a kind."""
+"""Tolerance for recognising a kind of timing, rows."""
 KINDS = (
     (0.5, "a command held from row to row"),
     (0.0, "a value sampled at the row"),
@@ -21,11 +21,11 @@ KINDS = (
 ALLOWED = ("elasticity", "elasticity of higher order", "play", "inertia by frequency", "no single inertia")
 CONTRADICTED = f"record contradicts the timing given ({name_option('torque_is')}, {name_option('delay')})"
 TIMING_CONTRADICTED = "timing-contradicted"
-"""Code of the note that states it."""
+"""Code of the note that reports a contradicted timing."""
 
 
 class Drift(NamedTuple):
-    """Growth of friction at the usual speed over a record, as a part of its value at the first row, with its ends."""
+    """Growth of friction at the usual speed over a record, as a part of its value at the first row, with its bounds."""
 
     share: float
     low: float
@@ -40,7 +40,7 @@ class Drift(NamedTuple):
 
 
 def drift_of(found: SlidingPosterior) -> Drift | None:
-    """The drift of friction over a record; None where its interval contains 0."""
+    """Return the drift of friction over a record; None if its interval contains 0."""
     drift, level = found.numbers["drift"], found.friction
     if drift.lower <= 0.0 <= drift.upper or level <= 0.0:
         return None
@@ -53,7 +53,7 @@ def drift_of(found: SlidingPosterior) -> Drift | None:
 
 
 def on_timing(found: SlidingPosterior) -> list[str]:
-    """When the torque acted, in a sentence; nothing where the record does not determine it."""
+    """Report when the torque acted, in a sentence; none if the record does not determine it."""
     skew, row = found.numbers["skew"], found.period
     if skew.half > KNOWN_DELAY * row or found.numbers["inertia"].lower <= 0.0:
         return []
@@ -67,7 +67,7 @@ def on_timing(found: SlidingPosterior) -> list[str]:
 
 
 def on_drift(found: SlidingPosterior) -> list[str]:
-    """That friction drifts over the record, in a sentence; nothing where it does not."""
+    """Report a drift of friction over the record, in a sentence; none without a drift."""
     drift = drift_of(found)
     if drift is None:
         return []
@@ -77,7 +77,7 @@ def on_drift(found: SlidingPosterior) -> list[str]:
 
 
 def on_alternatives(found: SlidingPosterior) -> list[str]:
-    """What else than a rigid axis with friction the record shows, in a sentence each."""
+    """Report what the record shows besides a rigid axis with friction, in one sentence."""
     shown = [(a, found.presence(n)) for n, a in found.alternatives.items() if found.presence(n) > PRESENT]
     shown = [
         (a, p) for a, p in shown if a.cause and a.name not in ("late torque", "drift") and not a.wave_number
@@ -91,17 +91,17 @@ def on_alternatives(found: SlidingPosterior) -> list[str]:
 
 
 MOSTLY = 1.0 / 3.0
-"""Part of a number's variance from which on an alternative is named as what widens it."""
+"""Part of a number's variance from which on an alternative is named as its cause."""
 
 
 def cause_of(found: SlidingPosterior, number: str) -> tuple[str, float]:
-    """The alternative that widens a number most, and its part of the variance; none below a third of it."""
+    """Return the alternative that widens a number most, and its part of the variance; none below a third of it."""
     name, share = found.explains(number)
     return (name, share) if share >= MOSTLY else ("", 0.0)
 
 
 def reason_for(found: SlidingPosterior, cause: str, share: float) -> str:
-    """Why a number is wide and what to record to exclude that, for a verdict; "" without a cause."""
+    """Explain why an interval is wide and what to record to narrow it, for a verdict; "" without a cause."""
     if not cause:
         return ""
     a = found.alternatives[cause]
@@ -109,7 +109,7 @@ def reason_for(found: SlidingPosterior, cause: str, share: float) -> str:
 
 
 def against_given(found: SlidingPosterior, given: float) -> list[str]:
-    """That the record shows another delay, s, than the given one; nothing where it does not."""
+    """Report that the record contradicts the given delay, s; none if it does not."""
     skew = found.numbers["skew"]
     if skew.lower <= given <= skew.upper or found.numbers["inertia"].lower <= 0.0:
         return []
@@ -123,7 +123,7 @@ def _when(skew: float) -> str:
 
 
 def on_exponents(exponents: Mapping[float, float]) -> list[str]:
-    """Return how likely the exponent of friction's fall is, where another one is possible."""
+    """Report the probability of the exponent of friction's fall; none if only one is possible."""
     if not exponents:
         return []
     likeliest = max(exponents, key=lambda e: exponents[e])

@@ -1,8 +1,8 @@
 """Gaussian posteriors of every combination of alternatives and falls of friction, from one Gram matrix.
 
-A member of the mixture says at which level every alternative is, and with which velocity and exponent friction falls.
-Its evidence, mean and covariance follow from the normal equations (Bayesian linear regression; Bishop 2006, 3.3). What
-another level of one alternative would be worth follows from the member's own posterior alone (Savage and Dickey).
+A member of the mixture is one choice of levels of all alternatives, and of the velocity and exponent of friction's
+fall. Its evidence, mean and covariance follow from the normal equations (Bayesian linear regression; Bishop 2006, 3.3).
+The evidence at another level of one alternative follows from the member's own posterior (Savage-Dickey ratio).
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ On = tuple[int, ...]
 """Level of every alternative."""
 
 EXPONENTS = (2.0, 1.0)
-"""Of friction's fall with velocity: Gaussian (Armstrong-Hélouvry 1991) and exponential (Tustin 1947)."""
+"""Exponents of friction's fall with velocity: Gaussian (Armstrong-Hélouvry 1991) and exponential (Tustin 1947)."""
 EXPONENT_ODDS = (0.8, 0.2)
 NO_FALL = 0.2
-"""Probability of no fall within the recorded speeds."""
+"""Prior probability of no fall within the recorded speeds."""
 BEYOND, BEYOND_ODDS = 0.5, 0.02
-"""Part of the highest speed from which on a fall is hardly told from viscous friction, and how likely one is there."""
+"""Part of the highest speed above which a fall resembles viscous friction, and the prior odds of a fall there."""
 FALL, ASYMMETRY = 0.3, 0.01
-"""Parts of Fc: what friction falls by, give and take as much; and by how much that may differ by direction."""
+"""Mean and standard deviation of the fall's prior, part of Fc; standard deviation of its difference by direction."""
 FALL_FORM = 0.03
-"""Part of the fall that its value at rest is unsure by: none has the exact form."""
+"""Relative standard deviation of the fall at rest: real friction follows no form exactly."""
 WIDE = 10.0
-"""Prior standard deviations of the plain model's numbers, in sizes of theirs."""
+"""Prior standard deviations of the plain model's numbers, relative to their size."""
 SPLIT = 0.3
-"""Part of the square of what two values of a number differ by that is its variance: of a value drawn between them."""
+"""Variance between two values of a number, as a part of their squared difference, for a value drawn between them."""
 
 
 class Level(NamedTuple):
-    """Sizes that coefficients are relative to: inertia, Fc, misfit where it accelerates, a row of skew."""
+    """Scales of the coefficients: inertia, Fc, misfit at the greatest acceleration, skew of one row."""
 
     inertia: float
     friction: float
@@ -47,7 +47,7 @@ class Level(NamedTuple):
     skew: float
 
     def of(self, unit: str) -> float:
-        """Size of a unit of alternatives."""
+        """Return the scale of an alternative's unit."""
         return {"inertia": self.inertia, "friction": self.friction, "noise": self.noise, "torque": 1.0}[unit]
 
 
@@ -88,7 +88,7 @@ class Falls:
 
 
 def falls_of(rows: SlidingRows, speeds: Array, exponents: Sequence[float] = EXPONENTS) -> Falls:
-    """Lay out falls of friction at some velocities, with every exponent."""
+    """Return the columns of friction's fall at some velocities, with every exponent."""
     speed, exponent = np.tile(speeds, len(exponents)), np.repeat(np.array(exponents), speeds.size)
 
     def left(r: SlidingRecord, fall: int) -> Array:
@@ -105,16 +105,16 @@ def falls_of(rows: SlidingRows, speeds: Array, exponents: Sequence[float] = EXPO
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Members that share the levels of their alternatives: without a fall of friction, then with each.
+    """Members with the same levels of their alternatives: without a fall of friction, then with each fall.
 
     Attributes
     ----------
     on : tuple of int
     log_evidence : array, shape (1 + f,)
     mean : array, shape (1 + f, p)
-        Of the coefficients, without those of the fall.
+        Means of the coefficients, without those of the fall.
     fall : array, shape (1 + f, 2)
-        Of the fall's coefficients.
+        Means of the fall's coefficients.
     base : array, shape (p, p)
         Covariance without a fall.
     gain : array, shape (1 + f, p, 2)
@@ -164,7 +164,7 @@ class Posterior:
         self.fall_std = np.array([FALL * level.friction, ASYMMETRY * level.friction])
 
     def family(self, on: On) -> Family:
-        """Evidence, mean and covariance of the members at some levels."""
+        """Compute evidence, mean and covariance of the members at some levels."""
         mean, std = (
             np.zeros(self.count),
             np.concatenate([self.core.std, *(s[k] for s, k in zip(self.stds, on, strict=True))]),
@@ -205,7 +205,7 @@ class Posterior:
             - 2.0 * right @ m
         )
         misfit = none + moved - np.einsum("pf,pf->f", z_base, x_base) - np.sum(z_fall * x_fall, axis=1)
-        # What rounding leaves of columns that say the same is no evidence.
+        # Rounding of linearly dependent columns is no evidence.
         sign, log_fall = np.linalg.slogdet(schur)
         log_fall = np.where(sign > 0.0, log_fall, np.inf)
         fallen = -0.5 * misfit - 0.5 * (log_det + log_fall) + odds + self.falls.log_odds
@@ -221,9 +221,9 @@ class Posterior:
         )  # fmt: skip
 
     def changes(self, family: Family, places: Any) -> dict[tuple[int, int], Array]:
-        """Log evidence of some members with each alternative at each other level, shape (members,) each.
+        """Return the log evidence of some members with each alternative at each other level, shape (members,) each.
 
-        From the members' own posteriors of its coefficients: no other is solved for.
+        It follows from the members' own posterior of the coefficients, without solving for another member.
         """
         out: dict[tuple[int, int], Array] = {}
         for k, (a, block) in enumerate(zip(self.alternatives, self.blocks, strict=True)):
@@ -235,7 +235,7 @@ class Posterior:
             spread = family.base[np.ix_(block, block)] + gain @ family.spread[places] @ gain.transpose(
                 0, 2, 1
             )
-            # In standard deviations of the level it has: what remains of each is at most 1.
+            # In standard deviations of the present level, each eigenvalue is at most 1.
             sizes, ways = np.linalg.eigh(spread / np.outer(now, now)) if a.shape is None else (None, None)
             for level in range(len(a.levels)):
                 if level == family.on[k]:
@@ -257,14 +257,14 @@ class Posterior:
         return out
 
     def predicted(self, family: Family, place: int) -> Array:
-        """Torque that a member explains, shape (n,)."""
+        """Return the torque that a member explains, shape (n,)."""
         told = self.matrix @ family.mean[place]
         return (
             told if place == 0 else told + self.fall_matrix[:, 2 * place - 2 : 2 * place] @ family.fall[place]
         )
 
     def fixed_columns(self, place: int, blocks: Sequence[int]) -> Array:
-        """Columns of the plain model, some alternatives and a member's fall, shape (n, k)."""
+        """Return the columns of the plain model, some alternatives and a member's fall, shape (n, k)."""
         own = [self.matrix[:, : len(self.core.names)], *(self.matrix[:, self.blocks[k]] for k in blocks)]
         if place:
             own.append(self.fall_matrix[:, 2 * place - 2 : 2 * place])
@@ -272,7 +272,7 @@ class Posterior:
 
 
 def _inverse(a: Array) -> tuple[Array, float]:
-    """Inverse and logarithm of the determinant of a positive definite matrix."""
+    """Return the inverse and the log determinant of a positive definite matrix."""
     from scipy.linalg import lapack
 
     solver: Any = lapack
@@ -285,6 +285,6 @@ def _inverse(a: Array) -> tuple[Array, float]:
 
 
 def log_sum(x: Array) -> float:
-    """Logarithm of a sum of exponentials."""
+    """Return the logarithm of a sum of exponentials."""
     top = float(np.max(x))
     return top + float(np.log(np.sum(np.exp(x - top))))

@@ -23,22 +23,22 @@ from stickslip.machines.servo import ServoAxis
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Integers = np.ndarray[Any, np.dtype[np.int64]]
 Series = Callable[[SlidingRecord], Array]
-"""Makes columns, shape (samples,) or (samples, k), of a record's smooth motion."""
+"""Function that returns columns, shape (samples,) or (samples, k), of a record's smooth motion."""
 
 WIDTHS = 3
-"""Windows, each twice as long as the one before: what differs between them is no rigid axis."""
+"""Number of window widths, each twice as long as the one before: a rigid axis gives the same result in all."""
 OVERLAP = 3.0
 """Rows per half window."""
 FEWEST = 12
-"""Rows of one width that are worth a regression: twice its plain parameters."""
+"""Fewest rows of one width that are worth a regression: twice its plain parameters."""
 MOST = 10_000
-"""Rows of one width and record: of a long record more tell no more."""
+"""Most rows of one width and record: more rows add no information."""
 LATEST = 8
-"""Samples by which the torque's column may lie off at most, where its delay is not stated."""
+"""Greatest delay of the torque's column, samples, if it is not stated."""
 USUAL = 0.98
-"""Quantile that stands for the largest velocity, acceleration and jerk."""
+"""Quantile that represents the largest velocity, acceleration and jerk."""
 RARE = 1e-3
-"""Part of the very largest, that it is at least."""
+"""Least value of that, as a part of the maximum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +49,11 @@ class Block:
     ----------
     record : SlidingRecord
     width : int
-        0 is the narrowest.
+        Index of the width; 0 is the narrowest.
     half : float
-        s
+        Half of the window's length, s.
     centres : array of int, shape (n,)
-        Samples about which the windows lie.
+        Samples at the windows' centres.
     """
 
     record: SlidingRecord
@@ -62,11 +62,11 @@ class Block:
     centres: Integers
 
     def windowed(self, series: Array, order: int = 0) -> Array:
-        """Windowed series, or its derivative of that order, shape (n, k)."""
+        """Return the windowed series, or its derivative of that order, shape (n, k)."""
         return np.asarray(self.operator(order) @ series)
 
     def operator(self, order: int) -> Any:
-        """Sparse matrix that windows a series, shape (n, samples)."""
+        """Return the sparse matrix that windows a series, shape (n, samples)."""
         kept: dict[int, Any] = self.__dict__.setdefault("kept", {})
         if order not in kept:
             from scipy.sparse import csr_matrix
@@ -81,7 +81,7 @@ class Block:
         return kept[order]
 
     def torque(self, skew: float, order: int = 0) -> Array:
-        """Windowed drive torque or its derivative of that order, its column `skew` s behind the torque that acted."""
+        """Return the windowed drive torque or its derivative of that order, for a column delayed by `skew` s."""
         weights = window_weights(self.half, self.record.period, (order,), skew)
         edge = math.ceil(abs(skew) / self.record.period) + 1
         padded = np.pad(self.record.drive, edge, mode="edge")
@@ -90,10 +90,10 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Samples(Block):
-    """Every sample of a record, seen as it is."""
+    """Every sample of a record, without windows."""
 
     def windowed(self, series: Array, order: int = 0) -> Array:
-        """The series itself."""
+        """Return the series itself."""
         return series
 
 
@@ -105,11 +105,11 @@ class SlidingRows:
     ----------
     blocks : tuple of Block
     sources : tuple of SlidingRecord
-        One for each experiment, those without rows too.
+        One for each experiment, including those without rows.
     velocity, acceleration, jerk, snap, pop : array, shape (n,)
         Windowed derivatives of the position, of order 1, 2, 3, 4 and 6.
     slopes : bool
-        Whether `see` gives time derivatives instead of values.
+        Whether `see` returns time derivatives instead of values.
     """
 
     blocks: tuple[Block, ...]
@@ -128,27 +128,27 @@ class SlidingRows:
 
     @property
     def rates(self) -> SlidingRows:
-        """The same rows, of which columns are seen as their time derivatives."""
+        """The same rows with `slopes`: `see` returns time derivatives."""
         return replace(self, slopes=True)
 
     @cached_property
     def kept(self) -> dict[str, Any]:
-        """What was made of the rows and is asked for again."""
+        """Cache of results that depend on the rows only."""
         return {}
 
     def see(self, series: Series) -> Array:
-        """Columns of the smooth motion through all windows, shape (n, k)."""
+        """Return columns of the smooth motion through all windows, shape (n, k)."""
         made = {id(r): series(r) for r in self.records}
         order = 1 if self.slopes else 0
         return np.concatenate([_columns(b.windowed(made[id(b.record)], order)) for b in self.blocks])
 
     def torque(self, skew: float) -> Array:
-        """Windowed torque that acted, shape (n,)."""
+        """Return the windowed torque that acted, shape (n,)."""
         loss = np.concatenate([np.full(b.centres.size, b.record.loss) for b in self.blocks])
         return np.concatenate([b.torque(skew) for b in self.blocks]) - loss * self.velocity
 
     def at_centres(self, series: Series) -> Array:
-        """A series at the windows' centres, shape (n,)."""
+        """Return a series at the windows' centres, shape (n,)."""
         return np.concatenate([series(b.record)[b.centres] for b in self.blocks])
 
     @cached_property
@@ -158,7 +158,7 @@ class SlidingRows:
 
     @cached_property
     def stroke(self) -> Integers:
-        """Number of a row's stroke."""
+        """Number of every row's stroke."""
         return np.concatenate([b.record.stroke[b.centres] for b in self.blocks])
 
     @cached_property
@@ -168,17 +168,17 @@ class SlidingRows:
 
     @cached_property
     def block(self) -> Integers:
-        """Number of a row's block: rows of one record and width share their noise."""
+        """Number of every row's block: rows of one record and width share their noise."""
         return np.concatenate([np.full(b.centres.size, i) for i, b in enumerate(self.blocks)])
 
     @cached_property
     def band(self) -> Array:
-        """-1 in the narrowest windows, 0 in the middle ones, 1 in the widest."""
+        """Width of every row: -1 in the narrowest windows, 0 in the middle ones, 1 in the widest."""
         return np.concatenate([np.full(b.centres.size, b.width - 1.0) for b in self.blocks])
 
     @cached_property
     def period(self) -> float:
-        """The longest one from sample to sample, s."""
+        """Longest sample period of the records, s."""
         return max(r.period for r in self.records)
 
     @cached_property
@@ -188,7 +188,7 @@ class SlidingRows:
 
     @cached_property
     def slowest(self) -> float:
-        """Speed that 1 % of the rows stay below, rad/s (m/s)."""
+        """Speed that 99 % of the rows exceed, rad/s (m/s)."""
         return float(np.quantile(np.abs(self.velocity), 0.01))
 
     @cached_property
@@ -198,7 +198,7 @@ class SlidingRows:
 
     @cached_property
     def range(self) -> float:
-        """Length of all positions, rad (m)."""
+        """Range of all positions, rad (m)."""
         return self._highest - self._lowest
 
     @cached_property
@@ -210,14 +210,14 @@ class SlidingRows:
         return max(float(r.position.max()) + r.origin for r in self.records)
 
     def place(self, record: SlidingRecord) -> Array:
-        """Position of a record's samples, from -1 at the one end of all to 1 at the other, shape (samples,)."""
+        """Return a record's positions, scaled from -1 to 1 over the range of all records, shape (samples,)."""
         return (record.position + record.origin - self.middle) / max(0.5 * self.range, 1e-300)
 
     @cached_property
     def largest(self) -> tuple[float, float, float]:
         """Usual largest speed, acceleration and jerk."""
         every = (self.velocity, self.acceleration, self.jerk)
-        # Where hardly a row accelerates, those that do are the usual ones.
+        # If few rows accelerate, a quantile of all rows would miss them.
         sizes = [max(float(np.quantile(np.abs(x), USUAL)), RARE * float(np.max(np.abs(x)))) for x in every]
         return sizes[0] or 1.0, sizes[1] or 1.0, sizes[2] or 1.0
 
@@ -227,7 +227,7 @@ def _columns(x: Array) -> Array:
 
 
 def sliding_rows(experiments: Sequence[Experiment], axis: ServoAxis) -> SlidingRows:
-    """See the strokes of some records through windows.
+    """Apply windows to the strokes of some records.
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def sliding_rows(experiments: Sequence[Experiment], axis: ServoAxis) -> SlidingR
 
 
 def _block(record: SlidingRecord, width: int, half: float) -> Block:
-    """Rows of one width whose windows lie inside strokes."""
+    """Return the rows of one width whose windows are inside strokes."""
     m = window_weights(half, record.period, (0,)).shape[1] // 2
     sliding = sum(j - i for i, j in record.strokes)
     hop = max(1, int(half / record.period / OVERLAP), sliding // MOST)
@@ -275,7 +275,7 @@ def _block(record: SlidingRecord, width: int, half: float) -> Block:
 
 
 def sample_rows(rows: SlidingRows, record: SlidingRecord) -> SlidingRows:
-    """All samples of one record as rows on the scales of others: for columns that `SlidingRows.see` makes."""
+    """Return all samples of a record as rows on the scales of other rows, for columns that `SlidingRows.see` makes."""
     every = np.arange(record.time.size)
     still = np.zeros(every.size)
     own = SlidingRows(

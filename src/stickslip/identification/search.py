@@ -1,8 +1,8 @@
-"""The search for what the record supports: weights, orders of cogging, levels of alternatives and the delay, in turn.
+"""The search for the supported model: weights, orders of cogging, levels of alternatives and the delay, in turn.
 
-From a start (a delay, and the widths that least absolute deviations look at) the weights of all rows, the levels of all
-alternatives and the delay of the torque's column are improved in turn until they stay. Levels climb the evidence one
-change at a time; every combination that was looked at stays in the mixture.
+From a start (a delay, and the widths used by least absolute deviations) the weights of all rows, the levels of all
+alternatives and the delay of the torque's column are improved in turn until they converge. Levels climb the evidence
+one change at a time; every combination that was evaluated stays in the mixture.
 """
 
 from __future__ import annotations
@@ -43,36 +43,37 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Places = np.ndarray[Any, np.dtype[np.intp]]
 
 ROUNDS = 8
-"""Of weights, levels and delay in turn: the last changes nothing that could be seen on most records."""
+"""Rounds of weights, levels and delay: on most records the last changes nothing significant."""
 ORDER_ROUNDS = 3
-"""First rounds in which orders of cogging are looked for."""
+"""First rounds, in which orders of cogging are searched."""
 SLOWEST_FALL, FASTEST_FALL, COARSE, FINE = 10.0**-2.7, 2.0, 16, 21
-"""Parts of the highest speed between which friction may fall, and how many of them, at first and finer."""
+"""Velocities of friction's fall, parts of the highest speed: least and greatest, and their number at first and
+refined."""
 STEPS = 12
 NEAR, FAR = 5.0, 25.0
-"""Log evidence within which members tell the next change, and beyond which a fall is looked at no more."""
+"""Log evidence within which members decide the next change, and beyond which a fall is dropped."""
 WORTH = 0.1
 """Log evidence that a change of level must gain."""
 DELAY_PRIOR = 0.6
-"""Rows by which a torque column usually lies off (one standard deviation): half a row for a command held, or a mean."""
+"""Prior standard deviation of the torque's delay, rows: half a row for a held command or a mean."""
 ROUNDING = 1e-9
-"""Of the highest speed from row to row: accelerations below it are rounding's."""
+"""Part of the highest speed per row below which an acceleration is rounding."""
 FIRST_FALLS = (0.01, 0.03, 0.1)
-"""Parts of the highest speed over which friction falls in the first fit."""
+"""Velocities of friction's fall in the first fit, parts of the highest speed."""
 GRAVITY = ("gravity_sin", "gravity_cos")
 GIVEN = 1e-4
-"""Rows to which a stated delay is known: what it is off by is no mere delay."""
+"""Standard deviation of a stated delay, rows: a larger deviation is not a mere delay."""
 
 
 class Start(NamedTuple):
-    """Where a search starts.
+    """Starting point of a search.
 
     Attributes
     ----------
     rows : float
-        Of delay.
+        Delay, rows.
     widths : tuple of int
-        Windows that the first fit looks at; all where empty.
+        Windows used by the first fit; all if empty.
     """
 
     rows: float = 0.0
@@ -81,23 +82,22 @@ class Start(NamedTuple):
 
 @dataclass(frozen=True)
 class Asked:
-    """What is known of an axis before its record is looked at.
+    """Known values and choices for the estimate of sliding.
 
     Attributes
     ----------
     pendulum : bool
-        Whether gravity turns with the position.
+        Whether gravity varies with the position.
     by_direction : bool
-        Whether viscous friction is another one in each direction; the constant torque is then half the difference of
-        both levels.
+        Whether viscous friction differs by direction; the constant torque is then half the difference of both levels.
     skew : float or None
-        s by which the torque's column lies behind the torque that acted, where it is stated.
+        Delay of the torque's column relative to the torque that acted, s, if it is stated.
     known : mapping
-        Values of numbers that are known, by name.
+        Known values of numbers, by name.
     exponents : tuple of float
-        Of friction's fall.
+        Exponents of friction's fall.
     period : float or None
-        rad (m) after which a torque over the position repeats; where None a turn, or no period of a linear axis.
+        Period of a torque over the position, rad (m); None for a turn, or no period for a linear axis.
     """
 
     pendulum: bool = False
@@ -111,25 +111,25 @@ class Asked:
 
 @dataclass
 class Fit:
-    """Where one start ended.
+    """End point of one start.
 
     Attributes
     ----------
     skew : float
-        s
+        Delay, s.
     level : Level
     alternatives : list of Alternative
     columns : list of array
-        Theirs.
+        Columns of the alternatives.
     core : Core
     torque : array, shape (n,)
-        At that skew.
+        Torque at that delay.
     falls : Falls
     on : tuple of int
     looked : dict
-        Log evidence of every combination of levels that was looked at.
+        Log evidence of every combination of levels that was evaluated.
     family : Family
-        That of `on`.
+        Family of `on`.
     noise : Noise
     rows : SlidingRows
     """
@@ -148,7 +148,7 @@ class Fit:
     rows: SlidingRows
 
     def posterior(self, weight: Array) -> Posterior:
-        """Its members under some weights."""
+        """Return the posterior of its members under given weights."""
         return Posterior(
             self.core, self.torque, weight, self.alternatives, self.columns, self.falls, self.level, self.rows
         )
@@ -171,12 +171,12 @@ def settle(rows: SlidingRows, asked: Asked, start: Start) -> Fit:
 
 
 class Search:
-    """One search: where it stands, and the steps that improve it.
+    """The state of one search, and the steps that improve it.
 
     Parameters
     ----------
     rows, asked, start
-        As of `settle`.
+        As in `settle`.
     """
 
     def __init__(self, rows: SlidingRows, asked: Asked, start: Start) -> None:
@@ -186,7 +186,7 @@ class Search:
         around = gravity_columns(rows) if asked.pendulum else None
         plain, gravity, self.residual = first_fit(rows, self.torque, start.widths, around)
         self.size = float(np.std(self.torque)) or 1e-300
-        # Constant velocities have none but rounding's.
+        # Constant velocities have no acceleration but rounding.
         least = ROUNDING * rows.fastest / rows.period
         self.pace = max(float(np.sqrt(np.mean(rows.acceleration**2))), least) or 1e-300
         inertia, friction = (
@@ -200,7 +200,7 @@ class Search:
         self.on: On = ()
         levels = asked.levels or {}
         usual = usual_alternatives(rows, asked.by_direction)
-        # What is stated is not doubted.
+        # Stated values have no alternatives.
         usual = tuple(
             a
             for a in usual
@@ -215,7 +215,7 @@ class Search:
         self.fit: Fit
 
     def laid_out(self) -> tuple[Posterior, Noise]:
-        """The posterior and the weights about where it stands."""
+        """Return the posterior and the weights at the present state."""
         noise = noise_of(self.rows, self.residual, self.level.inertia, self.level.friction)
         self.level = self.level._replace(noise=noise.accelerating)
         core = core_of(self.rows, self.asked, self.level, self.skew, self.moving, self.size, self.pace)
@@ -232,7 +232,7 @@ class Search:
         return posterior, noise
 
     def add(self, alternative: Alternative) -> None:
-        """Weigh one more alternative, absent at first."""
+        """Add one more alternative, absent at first."""
         columns, rates = columns_of(self.rows, alternative)
         self.alternatives.append(alternative)
         self.columns.append(columns)
@@ -240,7 +240,7 @@ class Search:
         self.on = (*self.on, 0)
 
     def look(self) -> Fit:
-        """Weights and levels about where it stands."""
+        """Update weights and levels at the present state."""
         self.posterior, noise = self.laid_out()
         core = self.posterior.core
         climbed = climb(self.posterior, self.on, self.near) if self.asked.levels is None else None
@@ -252,7 +252,7 @@ class Search:
         return self.fit
 
     def improve(self, number: int) -> None:
-        """Orders of cogging, sizes, delay and velocities of friction's fall, after a look in round `number`."""
+        """Update orders of cogging, scales, delay and velocities of friction's fall after round `number`."""
         family = self.fit.family
         top = int(np.argmax(family.log_evidence))
         mean = family.mean[top]
@@ -268,7 +268,7 @@ class Search:
         if number == ORDER_ROUNDS - 1:
             self.falls, self.near = finer(self.rows, self.posterior, family, self.asked), None
             if len(self.alternatives) > self.usual:
-                # What stood for cogging before its orders were known is to be weighed anew beside them.
+                # Alternatives that stood for cogging before its orders were known are weighed anew.
                 self.on = tuple(int(k >= self.usual) for k in range(len(self.alternatives)))
                 self.moving, self.skew = 0.0, self.begin
         elif number >= ORDER_ROUNDS:
@@ -276,7 +276,7 @@ class Search:
         self.torque = self.rows.torque(self.skew)
 
     def add_orders(self, top: int) -> None:
-        """Add the orders of cogging that show beside the plain model and those known already."""
+        """Add the orders of cogging that show in addition to the plain model and the known orders."""
         beside = self.posterior.fixed_columns(top, range(self.usual, len(self.posterior.alternatives)))
         root, known = np.sqrt(self.fit.noise.weight), {a.name for a in self.alternatives}
         for number in find_orders(self.rows, root, self.torque, beside, self.level.friction, self.numbers):
@@ -284,7 +284,7 @@ class Search:
                 self.add(more)
 
     def model_rate(self, mean: Array) -> Array:
-        """Time derivative of what the model says beside the inertia's torque: a late torque shifts that too."""
+        """Return the time derivative of the modelled torque except the inertia's: a delayed torque shifts that too."""
         names = self.fit.core.names
         out = mean[names.index("sigma2")] * self.rows.acceleration
         if self.asked.pendulum:
@@ -297,7 +297,7 @@ class Search:
 
 
 def columns_of(rows: SlidingRows, alternative: Alternative) -> tuple[Array, Array | None]:
-    """An alternative's columns and, where a delay shifts these, their rates; kept for the next start."""
+    """Return an alternative's columns and, if a delay shifts them, their rates; cached for the next start."""
     kept: dict[str, tuple[Array, Array | None]] = rows.kept
     if alternative.name not in kept or alternative.of_model:
         rates = alternative.columns(rows.rates) if alternative.lags else None
@@ -306,7 +306,7 @@ def columns_of(rows: SlidingRows, alternative: Alternative) -> tuple[Array, Arra
 
 
 SHRINK = 0.3
-"""Part of its size that inertia or friction may fall to from round to round."""
+"""Least ratio of inertia or friction from round to round."""
 
 
 def core_of(
@@ -318,17 +318,17 @@ def core_of(
     size: float,
     pace: float,
 ) -> Core:
-    """The plain model's columns about a skew: what is left of it is one more coefficient.
+    """Return the plain model's columns at a skew; the remaining skew is one more coefficient.
 
     Parameters
     ----------
     rows, asked, level
     skew : float
-        s of the torque's windows.
+        Skew of the torque's windows, s.
     moving : array, shape (n,)
-        Time derivative of what the model says beside the inertia's torque: a late torque shifts that too.
+        Time derivative of the modelled torque except the inertia's: a delayed torque shifts that too.
     size, pace : float
-        Of the torque and of the acceleration.
+        Scales of the torque and of the acceleration.
     """
     ones = np.ones(rows.sign.size)
     delay = -rows.jerk * level.inertia - moving
@@ -356,7 +356,7 @@ def core_of(
 
 
 def gravity_columns(rows: SlidingRows) -> Array:
-    """Sine and cosine of the position, shape (n, 2)."""
+    """Return sine and cosine of the position, shape (n, 2)."""
 
     def both(record: SlidingRecord) -> Array:
         angle = record.position + record.origin
@@ -368,16 +368,16 @@ def gravity_columns(rows: SlidingRows) -> Array:
 def first_fit(
     rows: SlidingRows, torque: Array, widths: Sequence[int], around: Array | None
 ) -> tuple[Array, tuple[float, float], Array]:
-    """A plain model by least absolute deviations, three falls of friction beside it.
+    """Fit a plain model with three falls of friction by least absolute deviations.
 
     Returns
     -------
     array, shape (4,)
         Inertia, fc, sigma2 and offset.
     tuple of float
-        Sine and cosine of gravity, whose columns are `around`; 0 where there are none.
+        Sine and cosine of gravity, whose columns are `around`; 0 without these.
     array, shape (n,)
-        What is left, N·m (N).
+        Residual torque, N·m (N).
     """
     falls = falls_of(rows, np.array(FIRST_FALLS) * rows.fastest, EXPONENTS[:1]).alike
     beside = np.zeros((torque.size, 0)) if around is None else around
@@ -398,9 +398,9 @@ def first_fit(
 
 
 def climb(posterior: Posterior, on: On, near: Places | None) -> tuple[On, dict[On, float], Family]:
-    """Change the level that raises the evidence most until none does; every combination seen, with its evidence.
+    """Change the level that raises the evidence most until none does; return every combination with its evidence.
 
-    `near` are the members (0: no fall) that count; all where None.
+    `near` are the members (0: no fall) that count; all if None.
     """
     looked: dict[On, float] = {}
     family = posterior.family(on)
@@ -410,7 +410,7 @@ def climb(posterior: Posterior, on: On, near: Places | None) -> tuple[On, dict[O
         looked[on] = log_sum(evidence)
         places = counts[evidence > np.max(evidence) - NEAR]
         changed = posterior.changes(family, places)
-        # Neighbours are worth as much more than this combination as they are for the members looked at.
+        # Neighbours gain as much over this combination as they do for the evaluated members.
         beyond = looked[on] - log_sum(family.log_evidence[places])
         around = {(*on[:k], level, *on[k + 1 :]): beyond + log_sum(e) for (k, level), e in changed.items()}
         looked = {**around, **looked}
@@ -446,7 +446,7 @@ def evaluate(posterior: Posterior, on: On) -> tuple[On, dict[On, float], Family]
 
 
 def moved_skew(posterior: Posterior, family: Family, place: int, skew: float, rows: SlidingRows) -> float:
-    """The skew a Gauss-Newton step further, s; a row at most."""
+    """Return the skew after a Gauss-Newton step of at most one row, s."""
     step = float(family.mean[place][posterior.core.names.index("skew")])
     for a, block in zip(posterior.alternatives, posterior.blocks, strict=True):
         if a.unit == "skew":
@@ -456,7 +456,7 @@ def moved_skew(posterior: Posterior, family: Family, place: int, skew: float, ro
 
 
 def finer(rows: SlidingRows, posterior: Posterior, family: Family, asked: Asked) -> Falls:
-    """Finer velocities about those of friction's fall that count."""
+    """Refine the velocities about those of friction's fall that count."""
     evidence, speeds = family.log_evidence, np.unique(posterior.falls.speed)
     good = np.flatnonzero(evidence[1:] > np.max(evidence) - 2.0 * NEAR)
     if not good.size:
@@ -467,7 +467,7 @@ def finer(rows: SlidingRows, posterior: Posterior, family: Family, asked: Asked)
 
 
 def neighbours(family: Family, falls: Falls) -> Places:
-    """Members that count, and those of the next velocities."""
+    """Return the members that count, and those at adjacent velocities."""
     good = np.flatnonzero(family.log_evidence > np.max(family.log_evidence) - FAR)
     around = np.concatenate([good - 1, good, good + 1, [0]])
     return np.unique(np.clip(around, 0, falls.speed.size))

@@ -1,4 +1,4 @@
-"""What gross sliding says of an axis: a mixture over every reason to doubt it.
+"""Estimates from gross sliding: a mixture over alternative explanations of a record.
 
 The posterior is a mixture over which alternatives are present, over the velocity and form of friction's fall and over
 several starts of the search (Hoeting et al. 1999); the interval of a number is the mixture's. Its covariances are never
@@ -30,20 +30,20 @@ from stickslip.machines.servo import ServoAxis
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 STARTS = (Start(), Start(widths=(2,)), Start(rows=-1.0))
-"""Where the search starts, in turn, until one ends where another did."""
+"""Starts of the search, used in turn until one ends where another did."""
 UNTHOUGHT = 1.2
-"""Factor on every half-width, for what no alternative describes: the one number here that was chosen by coverage (155
-simulated logs of the prototype)."""
+"""Factor on every half-width, for effects that no alternative describes: the only factor here calibrated by coverage on
+simulated logs."""
 QUANTILE = student_quantile(np.inf)
-"""Standard deviations on either side of 95 % of a normal distribution."""
+"""Half-width of a 95 % interval of a normal distribution, standard deviations."""
 CELL = 0.6
-"""Of the step from one velocity of friction's fall that is tried to the next: standard deviation within one."""
+"""Standard deviation within one velocity of friction's fall, as a part of the step to the next."""
 PRESENT = 0.5
-"""Probability from which on an alternative counts as there."""
+"""Probability from which on an alternative counts as present."""
 
 
 class LateTorque(InputError):
-    """The torque's column lies too far off for sliding to find by how much."""
+    """The torque's column is delayed too much for sliding to determine the delay."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Number:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Its ends."""
+        """The bounds of the interval."""
         return self.lower, self.upper
 
     @property
@@ -66,35 +66,35 @@ class Number:
 
     @property
     def std(self) -> float:
-        """Standard deviation of a normal distribution with an interval as wide."""
+        """Standard deviation of a normal distribution with an interval of the same width."""
         return self.half / QUANTILE
 
 
 @dataclass(frozen=True, eq=False)
 class SlidingPosterior:
-    """What gross sliding says.
+    """Posterior of the parameters that gross sliding determines.
 
     Attributes
     ----------
     names : tuple of str
-        ``inertia``, ``fc``, ``sigma2``, ``offset`` (at the usual speed, where friction differs by direction), ``skew``
-        (s by which the torque's column lies behind the torque that acted), ``fs`` (the curve's end at rest), ``drift``
-        (growth of friction's level from the first row to the last), ``elasticity`` (torque per second derivative of
-        the acceleration: -Jl²/k of a load Jl behind a spring k); of a pendulum ``gravity_sin``, ``gravity_cos``; by
-        direction ``fc_positive`` and so on.
+        ``inertia``, ``fc``, ``sigma2``, ``offset`` (at the usual speed, if friction differs by direction), ``skew`` (s
+        by which the torque's column is delayed relative to the torque that acted), ``fs`` (the curve at rest),
+        ``drift`` (growth of friction's level from the first row to the last), ``elasticity`` (torque per second
+        derivative of the acceleration: -Jl²/k of a load Jl behind a spring k); of a pendulum ``gravity_sin``,
+        ``gravity_cos``; by direction ``fc_positive`` and so on.
         Then the torque of steady motion forward and backward at `speeds`, ``forward[0]``, ..., ``backward[0]``, ...
     members : tuple of Member
     width : float
-        Standard deviations, in those of the members, on either side of 95 % of one member.
+        Half-width of a member's 95 % interval, in its standard deviations.
     rows : SlidingRows
     fits : tuple of Fit
-        Where the starts ended, the best first.
+        End points of the starts, the best first.
     spacing : float
-        Half of the 95 % interval of log(vs) within one member.
+        Half-width of the 95 % interval of log(vs) within one member.
     speeds : array, shape (m,)
         rad/s (m/s)
     beside : array, shape (n,)
-        Torque that the likeliest alternatives add in the rows, N·m (N), but those of the friction curve.
+        Torque that the likeliest alternatives add in the rows, N·m (N), without those of the friction curve.
     waves : tuple of (float, float)
         Wave number, rad⁻¹ (m⁻¹), and amplitude, N·m (N), of every torque found to repeat over the position.
     effects : mapping of str to array
@@ -119,7 +119,7 @@ class SlidingPosterior:
 
     @cached_property
     def numbers(self) -> dict[str, Number]:
-        """Value and interval of every number, the velocity ``vs`` of friction's fall among them where one is likely."""
+        """Value and interval of every number, with the velocity ``vs`` of friction's fall if one is likely."""
         mean, std = np.array([m.mean for m in self.members]), np.array([m.std for m in self.members])
         out = {
             n: Number(*quantiles(mean[:, k], self.width * std[:, k], self.weights))
@@ -133,12 +133,12 @@ class SlidingPosterior:
         return out
 
     def interval(self, name: str) -> tuple[float, float]:
-        """95 % interval of a number."""
+        """Return the 95 % interval of a number."""
         return self.numbers[name].interval
 
     @property
     def law_names(self) -> dict[str, str]:
-        """Names under which level and slope of friction stand here, by their names in laws."""
+        """Names of the level and slope of friction in this posterior, by their names in laws."""
         if "fc_negative" not in self.names:
             return {n: n for n in ("fc", "sigma2")}
         ways = (("", "positive"), (NEGATIVE, "negative"))
@@ -146,7 +146,7 @@ class SlidingPosterior:
 
     @property
     def alternatives(self) -> dict[str, Alternative]:
-        """Every alternative that was weighed, by its name."""
+        """Every alternative that was considered, by its name."""
         return {a.name: a for a in (DISTURBANCE, *(a for f in self.fits for a in f.alternatives))}
 
     @property
@@ -156,7 +156,7 @@ class SlidingPosterior:
 
     @property
     def exponents(self) -> dict[float, float]:
-        """Probability of every exponent of friction's fall, the likeliest first; its prior where nothing falls."""
+        """Probability of every exponent of friction's fall, the likeliest first; the prior if nothing falls."""
         prior = dict(zip(EXPONENTS, EXPONENT_ODDS, strict=True))
         found = {e: float(sum(m.weight for m in self.members if m.exponent == e)) for e in prior}
         whole = sum(found.values())
@@ -164,7 +164,7 @@ class SlidingPosterior:
         return dict(sorted(share.items(), key=lambda x: -x[1]))
 
     def given_exponent(self, exponent: float) -> SlidingPosterior:
-        """The posterior under the condition that friction falls with one exponent, or does not fall at all."""
+        """Return the posterior given that friction falls with one exponent or does not fall."""
         members = [m for m in self.members if m.exponent == exponent or np.isnan(m.exponent)]
         whole = sum(m.weight for m in members)
         if not whole:
@@ -172,25 +172,25 @@ class SlidingPosterior:
         return replace(self, members=tuple(replace(m, weight=m.weight / whole) for m in members))
 
     def presence(self, name: str) -> float:
-        """Probability that an alternative is present."""
+        """Return the probability that an alternative is present."""
         return float(sum(m.weight for m in self.members if name in m.on))
 
     @property
     def stiffness_bound(self) -> float:
-        """Least stiffness, N·m/rad (N/m), that a train to a load of half the inertia may have."""
+        """Least stiffness of a train to a load of half the inertia, N·m/rad (N/m), that the record allows."""
         least = min(self.numbers["elasticity"].lower, -1e-300)
         return (0.5 * self.numbers["inertia"].value) ** 2 / -least
 
     @property
     def compliance(self) -> str:
-        """The likeliest alternative in which motor and load do not move as one; "" where none is likely."""
+        """The likeliest alternative in which motor and load do not move as one; "" if none is likely."""
         likely = [n for n, a in self.alternatives.items() if a.compliant and self.presence(n) > PRESENT]
         return max(likely, key=self.presence, default="")
 
     def explains(self, number: str) -> tuple[str, float]:
-        """The alternative that widens a number most, and its part of the variance; "" where none does.
+        """Return the alternative that widens a number most, and its part of the variance; "" if none does.
 
-        Between members: by how much the variance falls where the alternative is absent.
+        The part is the relative decrease of the variance without the members that contain the alternative.
         """
         k = self.names.index(number)
         mean, std = np.array([m.mean[k] for m in self.members]), np.array([m.std[k] for m in self.members])
@@ -202,19 +202,19 @@ class SlidingPosterior:
         whole, best = variance(self.weights), ("", 0.0)
         for name in {n for m in self.members for n in m.on}:
             without = np.array([0.0 if name in m.on else m.weight for m in self.members])
-            # Present in all members, it is part of the answer and not a doubt.
+            # Present in all members, it is part of the answer and adds no uncertainty.
             share = 1.0 - variance(without) / whole if without.sum() > NEGLIGIBLE else 0.0
             best = max(best, (name, share), key=lambda x: x[1])
         return best
 
     @property
     def period(self) -> float:
-        """From row to row, s."""
+        """Sample period, s."""
         return self.rows.period
 
     @property
     def slowest(self) -> float:
-        """Speed that 1 % of the rows stay below, rad/s (m/s)."""
+        """Speed that 99 % of the rows exceed, rad/s (m/s)."""
         return self.rows.slowest
 
     @property
@@ -229,7 +229,7 @@ class SlidingPosterior:
 
     @property
     def friction(self) -> float:
-        """Level of friction that other torques are compared with, N·m (N): at the usual speed."""
+        """Level of friction at the usual speed, N·m (N), to which other torques are compared."""
         return max(self.numbers["fc"].value + max(self.numbers["sigma2"].value, 0.0) * self.usual_speed, 0.0)
 
     @cached_property
@@ -238,7 +238,7 @@ class SlidingPosterior:
         return self.rows.torque(self.numbers["skew"].value)
 
     def removable_torque(self, record: int) -> Array:
-        """Torque that likely alternatives add over position and time at every sample of a record, N·m (N)."""
+        """Return the torque of likely alternatives over position and time at every sample of a record, N·m (N)."""
         fit = self.fits[0]
         rows = sample_rows(self.rows, self.rows.sources[record])
         out = np.zeros(self.rows.sources[record].time.size)
@@ -262,16 +262,16 @@ def estimate_sliding(
         With the drive's signal. Fitted together.
     axis : ServoAxis
     asked : Asked, optional
-        What is known.
+        Known values.
     starts : sequence
-        Where the search starts, in turn, until one ends where another did.
+        Starts of the search, used in turn until one ends where another did.
 
     Raises
     ------
     TooLittleSliding
         If no stroke is long enough.
     LateTorque
-        If the torque's column lies too many rows off.
+        If the torque's column is delayed by too many rows.
     InputError
         If nothing moves.
     """
@@ -297,12 +297,12 @@ def estimate_sliding(
 
 
 def same_place(one: Fit, other: Fit) -> bool:
-    """Whether two starts ended with the same alternatives and, to a thousandth of a row, the same delay."""
+    """Return whether two starts ended with the same alternatives and, to a thousandth of a row, the same delay."""
     return one.on == other.on and abs(one.skew - other.skew) < 1e-3 * one.level.skew
 
 
 def posterior_of(rows: SlidingRows, fits: Sequence[Fit], found: Mixture) -> SlidingPosterior:
-    """The mixture with what its likeliest member says of every alternative."""
+    """Return the mixture with its likeliest member's coefficients of every alternative."""
     mean, alternatives = found.family.mean[found.place], found.posterior.alternatives
     effects = {a.name: mean[b] for a, b in zip(alternatives, found.posterior.blocks, strict=True)}
     beside, waves = np.zeros(rows.sign.size), list[tuple[float, float]]()
@@ -321,12 +321,12 @@ def posterior_of(rows: SlidingRows, fits: Sequence[Fit], found: Mixture) -> Slid
 
 
 def quantiles(mean: Array, std: Array, weight: Array) -> tuple[float, float, float]:
-    """Return median and ends of the central 95 % interval of a mixture of normal distributions, by bisection.
+    """Return median and bounds of the central 95 % interval of a mixture of normal distributions, by bisection.
 
     Parameters
     ----------
     mean, std, weight : array, shape (m,)
-        `std` in units in which 95 % lie within it.
+        `std` in units within which 95 % are contained.
     """
     from scipy.special import ndtr
 

@@ -1,14 +1,14 @@
-"""What reversals, break-away and slow motion say of a law: its simulation, held to the measured motion.
+"""Estimation of a law from reversals, break-away and slow motion, by simulation along the measured motion.
 
 The simulated axis is driven by the recorded torque and follows the measured motion through an observer
-(`stickslip.identification.observer.observer`); the torque that this takes is the misfit, whitened by an autoregression,
-outliers weighed by Student's distribution (prediction-error method: Ljung 1999, chapters 7 and 9). The torque's delay
-is inside: the simulated axis gets the torque when it acted.
+(`stickslip.identification.observer.observer`); the torque that this requires is the misfit, whitened by an
+autoregression, with Student weights against outliers (prediction-error method: Ljung 1999, chapters 7 and 9). The
+torque's delay is included: the simulated axis receives the torque when it acted.
 
-Inertia, constant torque, gravity and delay are those of gross sliding, which assumes less, and nothing feeds back to
-them (a cut posterior: Plummer 2015). The law's steady friction at the speeds of sliding is known from there too, as a
-prior; where the simulation contradicts it, its intervals grow (Birge 1932). Level and slope are then sliding's own;
-friction at rest and its velocity, of which both tell, are combined by their precision (DerSimonian and Laird 1986).
+Inertia, constant torque, gravity and delay are those of gross sliding, which assumes less, without feedback to them (a
+cut posterior: Plummer 2015). Sliding also gives a prior of the law's steady friction at its speeds; if the simulation
+contradicts it, the intervals widen (Birge 1932). Level and slope are then sliding's own; friction at rest and its
+velocity, which both determine, are combined by their precision (DerSimonian and Laird 1986).
 """
 
 from __future__ import annotations
@@ -65,27 +65,27 @@ from stickslip.simulation.prescribed.steady import Steady
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 STARTS, FIRST_STEPS, STEPS = 4, 30, 60
-"""Starts that are followed, simulations that each may take at first, and those of a later descent."""
+"""Starts that are followed; most simulations of each at first, and of a later descent."""
 SETTLED = 1e-3
-"""Relative decrease of the sum of squares at which a search ends."""
+"""Relative decrease of the sum of squares at which a search stops."""
 TOLERANCE = 1e-4
-"""The same of the last descent."""
+"""Relative decrease of the sum of squares at which the last descent stops."""
 UNMODELLED = 3.0
-"""Factor on the simulation's standard deviations, for what no part of it describes (torque between rows, ringing, the
-observer): chosen by coverage on 51 simulated logs (`benchmarks/ordinary_logs.py`, seeds 8200000, every 13th cell)."""
+"""Factor on the simulation's standard deviations, for effects that it does not describe (torque between rows, ringing,
+the observer): calibrated by coverage on simulated logs (`benchmarks/ordinary_logs.py`)."""
 DELAY_PRIOR = 0.6
-"""Rows, as of sliding: where no sliding tells the delay."""
+"""Prior standard deviation of the delay, rows, as in sliding: used if no sliding determines the delay."""
 SERIES = 0.1
-"""Part of the train's least stiffness that a contact's may be: the two in series are then softer by a tenth."""
+"""Greatest contact stiffness as a part of the train's least: the two in series are then softer by a tenth."""
 SURE = 0.95
 """Probability from which on friction is taken to fall with velocity."""
 ALIKE = 1e-3
-"""Part of friction by which any law's steady torque may be off."""
+"""Relative error of any law's steady torque."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What is known of the records before a law is simulated.
+    """Results that a law's simulation builds on.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Evidence:
         Without the torque over position and time that sliding found.
     axis : ServoAxis
     start : InverseDynamics
-        Plain least squares: where searches start.
+        Plain least squares: starting point of searches.
     sliding : SlidingPosterior or None
     """
 
@@ -103,32 +103,32 @@ class Evidence:
     sliding: SlidingPosterior | None
 
     def given_exponent(self, exponent: float) -> Evidence:
-        """The same, of sliding only what friction with one exponent of its fall leaves possible."""
+        """Return the evidence given one exponent of friction's fall in sliding."""
         return replace(self, sliding=self.sliding and self.sliding.given_exponent(exponent))
 
 
 @dataclass(frozen=True, eq=False)
 class LawFit:
-    """A law fitted to slow motion beside what sliding says.
+    """A law fitted to slow motion, given the results of sliding.
 
     Attributes
     ----------
     vector : Vector
-        Its free parameters are the law's; the axis's own too where no sliding tells them.
+        Its free parameters are the law's, and the axis's own if no sliding determines them.
     u : array, shape (p,)
     covariance : array, shape (p, p)
-        Of the coordinates.
+        Covariance of the coordinates.
     model : Model
     estimates : tuple of Estimate
-        Of the free parameters but the delay.
+        Estimates of the free parameters except the delay.
     contradiction : float
-        RMS deviation, in standard deviations, of what the simulation alone says of the steady friction from sliding.
+        RMS deviation of the simulation's own steady friction from sliding's, standard deviations.
     corrections : tuple of array
         Torque that the model lacks, N·m (N), in the observer's band.
     level : float
-        Of friction, N·m (N), that torques are compared with.
+        Level of friction, N·m (N), to which torques are compared.
     exponents : mapping of float to float
-        Probability of every exponent ``delta_s`` that was fitted; empty where one is given.
+        Probability of every exponent ``delta_s`` that was fitted; empty if one is given.
     """
 
     vector: Vector
@@ -142,7 +142,7 @@ class LawFit:
     exponents: Mapping[float, float] = field(default_factory=dict[float, float])
 
     def combinations(self) -> list[str]:
-        """Products of parameters that are determined although none of them is, in a sentence each."""
+        """Return products of parameters that are determined although no single one is, in a sentence each."""
         untold = {e.name for e in self.estimates if not e.identified and e.value > 0.0}
         free = [p for p in self.vector.free if p.name in untold and p.logarithmic]
         places = [i for p in free if (i := self.vector.coordinate_of(p.name)) is not None]
@@ -167,20 +167,20 @@ class LawFit:
 
     @property
     def correlation(self) -> Array:
-        """Of the estimates, shape (n, n)."""
+        """Correlation of the estimates, shape (n, n)."""
         kept = [i for i, n in enumerate(self.vector.names) if n != DELAY]
         change = self.vector.jacobian(self.u)[kept]
         return correlation_of(change @ self.covariance @ change.T)
 
 
 DETERMINED = math.log(2.0) / (2.0 * QUANTILE)
-"""Standard deviation of a logarithm at which a 95 % interval spans a factor of two: what identified means."""
+"""Standard deviation of a logarithm whose 95 % interval spans a factor of two: the limit of identified."""
 TAKES_PART = 0.3
 """Coefficient from which on a parameter is named in a combination."""
 
 
 def correlation_of(covariance: Array) -> Array:
-    """Correlation of a covariance; not a number where a variance is 0."""
+    """Return the correlation of a covariance; NaN where a variance is 0."""
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(covariance / np.outer(std, std))
@@ -190,7 +190,7 @@ def correlation_of(covariance: Array) -> Array:
 
 
 def known_mechanics(sliding: SlidingPosterior) -> dict[str, float]:
-    """Inertia, constant torque, gravity and delay as sliding has them."""
+    """Return inertia, constant torque, gravity and delay from sliding."""
     value = {n: x.value for n, x in sliding.numbers.items()}
     known = {n: value[n] for n in ("inertia", "offset", DELAY)}
     known["inertia"] = max(known["inertia"], 1e-3 * sliding.fits[0].level.inertia)
@@ -201,7 +201,7 @@ def known_mechanics(sliding: SlidingPosterior) -> dict[str, float]:
 
 
 def curve_seen(law: Law, speeds: Array) -> Any:
-    """Function of named numbers and a law's parameters: torque of steady motion forward and backward at some speeds."""
+    """Return a function of named numbers and parameters: steady torque forward and backward at some speeds."""
     velocity = np.concatenate([speeds, -speeds])
     steady = Steady(law, velocity, np.sign(velocity))
 
@@ -212,12 +212,12 @@ def curve_seen(law: Law, speeds: Array) -> Any:
 
 
 def curve_places(sliding: SlidingPosterior) -> list[int]:
-    """Where the torques of steady motion stand among the numbers of sliding."""
+    """Return the indices of the steady torques among the numbers of sliding."""
     return [k for k, n in enumerate(sliding.names) if n.startswith(("forward[", "backward["))]
 
 
 def curve_prior(law: Law, sliding: SlidingPosterior | None) -> Prior | None:
-    """What sliding says of a law's steady friction; None for a law that has none."""
+    """Return sliding's prior of a law's steady friction; None for a law without steady friction."""
     if sliding is None or law.steady is None:
         return None
     mean, covariance = moments(sliding, curve_places(sliding))
@@ -228,12 +228,12 @@ def curve_prior(law: Law, sliding: SlidingPosterior | None) -> Prior | None:
 
 
 def form_of(sliding: SlidingPosterior) -> Array:
-    """Covariance of steady torques from a law's form, which no friction follows exactly."""
+    """Return the covariance of steady torques from a law's form, which real friction never follows exactly."""
     return (ALIKE * sliding.friction) ** 2 * np.eye(2 * sliding.speeds.size)
 
 
 def moments(sliding: SlidingPosterior, places: Sequence[int]) -> tuple[Array, Array]:
-    """Mean and covariance of some numbers of the mixture, as wide as its intervals."""
+    """Return mean and covariance of some numbers of the mixture, as wide as its intervals."""
     w = sliding.weights
     means = np.array([m.mean[places] for m in sliding.members])
     mean = w @ means
@@ -247,7 +247,7 @@ def moments(sliding: SlidingPosterior, places: Sequence[int]) -> tuple[Array, Ar
 def laid_out_with_delay(
     evidence: Evidence, law: Law, first: InverseDynamics, model: Model, asked: Asked
 ) -> Vector:
-    """The vector of what is fitted: the axis's own numbers are held where sliding tells them, the delay is one more."""
+    """Return the vector of fitted parameters and the delay; the axis's own are held if sliding determines them."""
     sliding, period = evidence.sliding, max(t.period for t in evidence.experiments)
     late = 0.0
     if sliding is not None:
@@ -268,7 +268,7 @@ def laid_out_with_delay(
 def search_law(
     evidence: Evidence, law: Law, asked: Asked, seen: Watched, steps: int = STEPS
 ) -> tuple[Criterion, Array]:  # fmt: skip
-    """The best minimum from several starts, weights adapted once; its criterion and coordinates.
+    """Find the best minimum from several starts, weights adapted once; return its criterion and coordinates.
 
     Raises
     ------
@@ -288,7 +288,7 @@ def search_law(
     for model in starting_points(evidence.experiments, evidence.axis, law, first, asked.values):
         vector = laid_out_with_delay(evidence, law, first, model, asked)
         inertia = vector.named(vector.start)["inertia"]
-        # All start from one inertia.
+        # All starts share one inertia.
         records = records or [
             prepare(m, law, inertia, level, seen.band, rounding=ROUGH) for m in seen.motions
         ]
@@ -313,7 +313,7 @@ def search_law(
 
 
 def start_beside(evidence: Evidence) -> InverseDynamics:
-    """Plain least squares with the numbers of sliding in place of their own."""
+    """Return plain least squares with its values replaced by those of sliding."""
     start, sliding = evidence.start, evidence.sliding
     if sliding is None or not start.has("fc"):
         return start
@@ -338,9 +338,9 @@ def fit_law(
     evidence : Evidence
     law : Law
     asked : Asked
-        What the user holds, frees and gives.
+        Values that the user holds, frees and gives.
     start : mapping, optional
-        Values of the law at which the search begins; several starts are tried where None.
+        Starting values of the law; several starts are tried if None.
     exponents : mapping of float to float, optional
         Exponents ``delta_s`` of friction's fall with their probabilities from sliding. The law is fitted with each; the
         likeliest gives the values, and the intervals are those of the mixture (Hoeting et al. 1999).
@@ -359,7 +359,7 @@ def fit_law(
         start = minima[0].law_fit.model.parameters._asdict()
     first, best = minima[0], min(minima, key=minima[0].cost_of)
     if best is not first:
-        # The search is local: what it found with another exponent may be a better start for this one.
+        # The search is local: the minimum with another exponent may be a better start for this one.
         likeliest = next(iter(exponents))
         values = {**best.law_fit.model.parameters._asdict(), "delta_s": likeliest}
         again = fit_minimum(evidence.given_exponent(likeliest), law, asked, values)
@@ -369,7 +369,7 @@ def fit_law(
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """A law fitted with one exponent, the criterion that it minimises, and where."""
+    """A law fitted with one exponent, its criterion and the coordinates of the minimum."""
 
     law_fit: LawFit
     criterion: Criterion
@@ -380,7 +380,7 @@ class Minimum:
         return replace(self.criterion, vector=other.criterion.vector, prior=None).residuals(other.u) ** 2
 
     def prior_of(self, other: Minimum) -> float:
-        """Return by how much another minimum contradicts the steady friction of sliding, a sum of squares."""
+        """Return the sum of squares by which another minimum contradicts the steady friction of sliding."""
         prior = other.criterion.prior
         own = replace(self.criterion, vector=other.criterion.vector, prior=prior)
         return (
@@ -396,8 +396,8 @@ class Minimum:
     def log_odds(self, other: Minimum, prior: float) -> float:
         """Return the log odds of another minimum against this one, after `prior` log odds.
 
-        The difference of both log likelihoods is as sure as that of the segments of time it adds up from (Vuong 1989);
-        odds are averaged over what it may be (MacKay 1992).
+        The uncertainty of the difference of both log likelihoods follows from its scatter over segments of time (Vuong
+        1989); the odds are averaged over it (MacKay 1992).
         """
         apart = 0.5 * (self.squares_of(self) - self.squares_of(other))
         segments = np.bincount(self.criterion.blocks(BLOCK), apart)
@@ -440,7 +440,7 @@ def fit_minimum(evidence: Evidence, law: Law, asked: Asked, start: Mapping[str, 
 
 
 def mix_minima(minima: Sequence[Minimum], probabilities: Sequence[float]) -> LawFit:
-    """The likeliest fit with the intervals of the mixture over all of them."""
+    """Return the likeliest fit with the intervals of the mixture over all of them."""
     prior = np.log(np.array(probabilities) / probabilities[0])
     log_weight = np.array([minima[0].log_odds(m, x) for m, x in zip(minima, prior.tolist(), strict=True)])
     share = np.exp(log_weight - log_sum(log_weight))
@@ -453,7 +453,7 @@ def mix_minima(minima: Sequence[Minimum], probabilities: Sequence[float]) -> Law
         if not np.all(np.isfinite(ends)):
             found.append(e)
             continue
-        # A positive number's interval is one of its logarithm.
+        # A positive number's interval is mixed in its logarithm.
         positive = bool(np.all(ends > 0.0))
         ends = np.log(ends) if positive else ends
         _, low, high = quantiles(ends.mean(axis=1), 0.5 * (ends[:, 1] - ends[:, 0]), share)
@@ -467,7 +467,7 @@ def mix_minima(minima: Sequence[Minimum], probabilities: Sequence[float]) -> Law
 def compliant_refused(
     estimates: Sequence[Estimate], model: Model, sliding: SlidingPosterior
 ) -> list[Estimate]:
-    """The estimates, those of pre-sliding refused where a train may yield as much as the contact does at reversals."""
+    """Return the estimates; those of pre-sliding become not identified if a train may yield as much as the contact."""
     law, p = model.law, model.parameters
     stiffness, cause = stiffness_at_rest(law, p), sliding.compliance
     if cause:
@@ -487,17 +487,17 @@ def compliant_refused(
 
 
 def model_at(law: Law, vector: Vector, u: Array) -> Model:
-    """The law at some coordinates, or as near to them as it accepts."""
+    """Return the law at some coordinates, or the nearest parameters that it accepts."""
     accepted = feasible(law, vector.law_parameters(u))
     assert accepted is not None
     return Model(law, **accepted._asdict())
 
 
 def spread_of(criterion: Criterion, optimum: Any, evidence: Evidence) -> tuple[Array, float]:
-    """Covariance of the coordinates, and by how much the simulation contradicts sliding, in standard deviations.
+    """Return the covariance of the coordinates, and the simulation's contradiction to sliding in standard deviations.
 
-    By leaving stretches of time out or by giving the corrections back as noise, whichever is larger; by the prior and
-    what sliding leaves open of the axis's own numbers. A contradiction widens it all (Birge 1932).
+    It is the larger of leaving segments of time out and of adding the corrections back as noise, with the prior and the
+    uncertainty of the axis's own numbers in sliding. A contradiction widens all of it (Birge 1932).
     """
     free = replace(criterion, prior=None)
     known = 0 if criterion.prior is None else criterion.prior.mean.size
@@ -526,7 +526,7 @@ def spread_of(criterion: Criterion, optimum: Any, evidence: Evidence) -> tuple[A
 def of_the_axis(
     criterion: Criterion, u: Array, sliding: SlidingPosterior, information: Array, jacobian: Array
 ) -> Array:
-    """Covariance of the law's coordinates that sliding leaves by inertia, constant torque and delay."""
+    """Return the law's covariance due to sliding's uncertainty of inertia, constant torque and delay."""
     names = [n for n in ("inertia", "offset", DELAY) if n in sliding.names]
     _, spread = moments(sliding, [sliding.names.index(n) for n in names])
     base, held = criterion.weighed(u), {p.name: p.value for p in criterion.vector.parameters if not p.free}
@@ -546,7 +546,7 @@ def of_the_axis(
 
 
 def held_elsewhere(vector: Vector, name: str, value: float) -> Vector:
-    """The vector with another value of a held parameter."""
+    """Return the vector with another value of a held parameter."""
     assert vector.base is not None
     own = {f.name for f in vector.base.law.fields}
     beside = [
@@ -557,18 +557,18 @@ def held_elsewhere(vector: Vector, name: str, value: float) -> Vector:
     return type(vector)(vector.base, frozen=[p.name for p in vector.parameters if not p.free], extra=beside)
 
 
-# ---- beside sliding -------------------------------------------------------------------------------------------------
+# ---- combination with sliding ---------------------------------------------------------------------------------------
 
 
 def own_estimate(vector: Vector, place: int, u: Array, covariance: Array, level: float) -> Estimate:
-    """What the simulation says of a free parameter."""
+    """Return the simulation's own estimate of a free parameter."""
     p, value, change = vector.free[place], float(vector.values(u)[place]), vector.jacobian(u)[place]
     std = math.sqrt(max(float(change @ covariance @ change), 0.0))
     return judged(p, value, *interval_of(p, value, QUANTILE * std, None), level)
 
 
 def judged(p: Parameter, value: float, low: float, high: float, level: float) -> Estimate:
-    """An estimate with its verdict; torques are compared with friction's level."""
+    """Return an estimate with its verdict; torques are compared to friction's level."""
     scale = 1.0 if p.par.unit == "rad" else level
     why = verdict_on(p, value, low, high, Noise(1.0, "residual", math.inf), scale)
     std = (high - low) / (2.0 * QUANTILE)
@@ -576,10 +576,10 @@ def judged(p: Parameter, value: float, low: float, high: float, level: float) ->
 
 
 def beside_sliding(e: Estimate, p: Parameter, sliding: SlidingPosterior, level: float) -> Estimate:
-    """Level and slope as sliding has them; of friction at rest and its velocity, of which both tell, both.
+    """Return level and slope from sliding; combine friction at rest and its velocity from both sources.
 
-    Each counts by its precision, in logarithms; where they contradict each other the variance between them is added to
-    both (DerSimonian and Laird 1986).
+    Each source counts by its precision, in logarithms; if they contradict each other, the variance between them is
+    added to both (DerSimonian and Laird 1986).
     """
     both_ways = f"fc{NEGATIVE}" in sliding.law_names
     name = sliding.law_names.get(p.name, "")
@@ -601,7 +601,7 @@ def beside_sliding(e: Estimate, p: Parameter, sliding: SlidingPosterior, level: 
         return replace(found, identified=False, verdict=why)
     own = math.log(e.upper / e.lower) / (2.0 * QUANTILE)
     theirs = math.log(other.upper / other.lower) / (2.0 * QUANTILE)
-    # Of a fall that may be none at all its velocity says as much less.
+    # The less probable a fall, the less precise its velocity.
     theirs /= sliding.falls if p.name == "vs" else 1.0
     apart = math.log(other.value / e.value)
     between = max(0.0, 0.5 * (apart**2 - own**2 - theirs**2))
@@ -612,15 +612,15 @@ def beside_sliding(e: Estimate, p: Parameter, sliding: SlidingPosterior, level: 
 
 
 OTHERWISE = {"fc": 1.3, "fs": 1.6, "vs": 3.0, "sigma2": 2.0}
-"""Factors of a second set of values at which the curves must be the same: their form is compared, not their values."""
+"""Factors of a second set of values at which the curves must agree: their form is compared, not their values."""
 
 
 def means_the_same(model: Model, speeds: Array) -> bool:
-    """Whether a law's ``fc``, ``fs``, ``vs`` and ``sigma2`` are those of sliding's curve, level, fall and slope.
+    """Return whether a law's ``fc``, ``fs``, ``vs`` and ``sigma2`` are level, fall and slope of sliding's curve.
 
-    A law of one's own may mean other things by these names: it then has its numbers from the simulation, which the
-    steady friction of sliding holds, as under any other names. Compared at the upper half of sliding's speeds: on a
-    steep slope through zero a contact only creeps.
+    A user's law may give these names other meanings: its parameters then come from the simulation, constrained by
+    sliding's steady friction, as under any other names. The upper half of sliding's speeds is compared: on a steep
+    slope through zero a contact only creeps.
     """
     law, p = model.law, model.parameters
     if law.steady is None or not hasattr(p, "fc"):

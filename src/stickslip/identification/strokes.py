@@ -1,4 +1,4 @@
-"""A record on an even grid, and its strokes: the stretches in which the axis slides one way for certain."""
+"""A record on an even grid, and its strokes: the intervals of gross sliding in one direction."""
 
 from __future__ import annotations
 
@@ -21,45 +21,45 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.int64]]
 
 NARROWEST = 0.02
-"""s: half of the narrowest window. It passes what a servo's position loop does, some tens of hertz."""
+"""Half of the narrowest window, s. It passes the bandwidth of a servo's position loop, some tens of hertz."""
 NOISE_SHARE = 2e-3
-"""Part of the acceleration's power that noise of the position may be: least squares bias the inertia by as much."""
+"""Power of the position's noise as a part of the acceleration's power: it biases the inertia by as much."""
 WIDEN = 1.15
-"""From one window tried to the next, until noise is that small."""
+"""Ratio of one window tried to the next, until noise is that small."""
 MOST_OF_RECORD = 0.05
-"""Part of the record that half a window may be: ten windows at least, side by side."""
+"""Greatest half window as a part of the record: at least ten windows fit in it."""
 CERTAIN = 6.0
-"""Standard deviations of the velocity's noise from which on its sign is certain."""
+"""Velocity, in standard deviations of its noise, from which on its sign is certain."""
 CREEP = 0.003
 """Part of the highest speed below which a contact may still creep: the slope of a bristle through zero."""
 
 
 class TooLittleSliding(InputError):
-    """A record slides too little in one direction at a time for any window."""
+    """Too little sliding in one direction for any window."""
 
 
 @dataclass(frozen=True, eq=False)
 class SlidingRecord:
-    """One experiment on an even grid, its smooth motion and its strokes.
+    """One experiment on an even grid, with its smooth motion and its strokes.
 
     Attributes
     ----------
     time, position, drive : array, shape (n,)
-        s; rad (m) from `origin` on; torque that the drive's signal stands for, N·m (N), before `loss`.
+        s; rad (m) relative to `origin`; torque of the drive's signal, N·m (N), before `loss`.
     loss : float
-        Torque that the drive loses per velocity, N·m·s/rad.
+        Loss of the drive's torque per velocity, N·m·s/rad.
     origin : float
         Position of the first sample, rad (m).
     velocity, acceleration : array, shape (n,)
         rad/s (m/s), rad/s² (m/s²), of the motion itself.
     stroke : array of int, shape (n,)
-        Number of the stroke of a sample; -1 in none.
+        Number of every sample's stroke; -1 outside strokes.
     since, until : array, shape (n,)
-        Way since the stroke began and to its end, rad (m).
+        Distance from the stroke's start and to its end, rad (m).
     fastest : float
         Speed that 0.5 % of the samples exceed, rad/s (m/s).
     torque_step : float
-        To which the drive's column is rounded, N·m (N); 0 where no rounding shows.
+        Rounding step of the drive's column, N·m (N); 0 if no rounding shows.
     """
 
     time: Array
@@ -77,7 +77,7 @@ class SlidingRecord:
 
     @property
     def period(self) -> float:
-        """From sample to sample, s."""
+        """Sample period, s."""
         return float((self.time[-1] - self.time[0]) / (self.time.size - 1))
 
     @property
@@ -87,18 +87,18 @@ class SlidingRecord:
 
     @cached_property
     def strokes(self) -> list[tuple[int, int]]:
-        """First sample of every stroke and the one behind its last."""
+        """First sample of every stroke and the one after its last."""
         edges = np.flatnonzero(np.diff(self.stroke, prepend=-1, append=-1))
         return [(i, j) for i, j in itertools.pairwise(edges.tolist()) if self.stroke[i] >= 0]
 
 
 def narrowest_half(experiment: Experiment) -> float:
-    """Half of the narrowest window in which noise of the position leaves the acceleration alone, s.
+    """Return half of the narrowest window in which the position's noise hardly affects the acceleration, s.
 
     Raises
     ------
     TooLittleSliding
-        If it is long beside the record.
+        If it is too long for the record.
     """
     t, q, _, rate = uniform(experiment)
     noise = math.sqrt(white_noise(q, rate) * rate / 2.0)
@@ -123,7 +123,7 @@ def narrowest_half(experiment: Experiment) -> float:
 def sliding_record(
     experiment: Experiment, axis: ServoAxis, half: float, first_stroke: int = 0
 ) -> SlidingRecord:
-    """Lay an experiment out on an even grid and find its strokes.
+    """Resample an experiment on an even grid and find its strokes.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
-"""Motor and load behind a spring, where sliding shows that the axis is not rigid.
+"""Motor and load behind a spring, if sliding shows that the axis is not rigid.
 
-While the motor is held the load swings at omega; the motor's acceleration a then obeys
-(1 + D²/omega²) (T - F) = J a + Jm/omega² D² a, D = d/dt. So the second derivatives of the torque and of the
-acceleration tell omega and the motor's inertia Jm. They are read in the two widest windows, where noise of the torque
-biases them least; their difference is how unsure they are.
+With the motor held, the load oscillates at omega; the motor's acceleration a then obeys (1 + D²/omega²) (T - F) = J a +
+Jm/omega² D² a, D = d/dt. The second derivatives of the torque and of the acceleration therefore determine omega and the
+motor's inertia Jm. They are taken from the two widest windows, in which noise of the torque biases them least; the
+difference between both is the uncertainty.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from stickslip.machines.two_inertias import TwoInertias
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 DAMPED = 0.05
-"""Half-width of the frequency at least, as a part of it: the spring's damping moves it up by as much."""
+"""Least relative half-width of the frequency: the spring's damping shifts it by as much."""
 SURE_SHARE = 0.03
-"""Half-width of the motor's part of the inertia at least."""
+"""Least half-width of the motor's share of the inertia."""
 MOST_FREQUENCY, MOST_SHARE = 0.25, 0.15
-"""Half-widths, of the frequency relative, up to which motor and load are told."""
+"""Greatest half-widths, of the frequency relative, at which motor and load count as determined."""
 
 
 def two_inertias(found: SlidingPosterior) -> TwoInertias | None:
-    """Motor and load as the two widest windows tell them; None where they do not."""
+    """Return motor and load determined by the two widest windows; None if these do not determine them."""
     if not found.compliance:
         return None
     widths = sorted({b.width for b in found.rows.blocks})[-2:]
@@ -43,7 +43,7 @@ def two_inertias(found: SlidingPosterior) -> TwoInertias | None:
 
 
 def _seen_in(found: SlidingPosterior, width: int) -> tuple[float, float] | None:
-    """Frequency of the load, Hz, and the motor's part of the inertia in windows of one width; None for no load."""
+    """Return the load's frequency, Hz, and the motor's inertia share in one window width; None without a load."""
     rows, fit = found.rows, found.fits[0]
     mine = np.isin(rows.block, [i for i, b in enumerate(rows.blocks) if b.width == width])
     bent = np.concatenate([b.torque(fit.skew, 2) for b in rows.blocks if b.width == width])

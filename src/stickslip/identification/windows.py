@@ -17,26 +17,26 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.int64]]
 
 POWER = 6
-"""Of the window (1 - x²)^POWER: smooth enough for its sixth derivative to be bounded at the ends."""
+"""Exponent of the window (1 - x²)^POWER: smooth enough for a bounded sixth derivative at its ends."""
 LEAST_SAMPLES = 6
-"""Samples in half of a window, so that sums stand for its integrals."""
+"""Least samples in half of a window for sums to approximate its integrals."""
 GATHERED = 2**20
-"""Samples that `apply_at` copies at a time (8 MiB); it changes the memory, no result."""
+"""Samples that `apply_at` copies at a time (8 MiB); affects memory, not results."""
 
 
 def window_weights(half: float, period: float, orders: Sequence[int], late: float = 0.0) -> Array:
-    """Weights of the samples about a centre that give windowed derivatives, exact on polynomials.
+    """Return sample weights for windowed derivatives about a centre, exact on polynomials.
 
     Parameters
     ----------
     half : float
         Half of the window's length, s.
     period : float
-        From sample to sample, s.
+        Sample period, s.
     orders : sequence of int
-        Of the derivatives; 0 is the windowed value.
+        Orders of the derivatives; 0 is the windowed value.
     late : float
-        s by which the window lies behind its centre.
+        Delay of the window relative to its centre, s.
 
     Returns
     -------
@@ -67,23 +67,23 @@ def _weights(half: float, period: float, orders: tuple[int, ...], late: float) -
 
 @lru_cache(maxsize=1)
 def _area() -> float:
-    """Integral of the window over [-1, 1]."""
+    """Return the integral of the window over [-1, 1]."""
     x, w = np.polynomial.legendre.leggauss(POWER + 1)
     return float(np.sum(w * (1.0 - x * x) ** POWER))
 
 
 def unblurred_weights(half: float, period: float) -> Array:
-    """Weights for velocity and acceleration of the motion itself, not of its mean over the window, shape (2, 2 m + 1).
+    """Return weights for velocity and acceleration of the motion itself, not its window mean, shape (2, 2 m + 1).
 
     The window's second moment, half² / (2 POWER + 3), blurs a signal by half of it times its second derivative, which
-    is taken off.
+    is subtracted.
     """
     w = window_weights(half, period, (1, 2, 3, 4))
     return np.asarray(w[:2] - w[2:] * half**2 / (2.0 * (2 * POWER + 3)))
 
 
 def apply_at(series: Array, centres: Rows, weights: Array) -> Array:
-    """A series, shape (n,), seen through windows about some samples, shape (centres,) or (centres, orders)."""
+    """Apply windows to a series, shape (n,), about some samples; return shape (centres,) or (centres, orders)."""
     m = weights.shape[-1] // 2
     view = np.lib.stride_tricks.sliding_window_view(series, 2 * m + 1)
     together = max(1, GATHERED // (2 * m + 1))

@@ -1,4 +1,4 @@
-"""Every reason why a number of the plain model could be wrong, one file each: a new doubt is a new file here.
+"""Alternative explanations of a record, one file per kind: to add an alternative, add a file here.
 
 A file has ``ALTERNATIVES``, a tuple of `stickslip.identification.alternatives.alternative.Alternative`.
 """
@@ -35,7 +35,7 @@ FILES = (
 
 
 def usual_alternatives(rows: SlidingRows, by_direction: bool = False) -> tuple[Alternative, ...]:
-    """All but those that take a model or a search to be written down; fewer where friction is told by direction."""
+    """Return all alternatives that need neither a model nor a search; fewer if friction is identified by direction."""
     between = (drift.BETWEEN_RECORDS,) if len(rows.records) > 1 else ()
     every = (*(a for file in FILES for a in file.ALTERNATIVES), *between)
     return tuple(a for a in every if not (by_direction and a is direction.VISCOUS))

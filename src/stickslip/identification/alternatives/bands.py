@@ -1,4 +1,4 @@
-"""No rigid axis: the inertia is another one in narrow windows (high frequencies) than in wide ones."""
+"""No rigid axis: the inertia differs between narrow windows (high frequencies) and wide ones."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ REMEDY = "record longer moves with gentler accelerations, in which motor and loa
 
 
 def coupled(rows: SlidingRows) -> Array:
-    """Smooth functions of velocity, acceleration and jerk together, shape (n, 12)."""
+    """Return smooth joint functions of velocity, acceleration and jerk, shape (n, 12)."""
     scaled = zip((rows.velocity, rows.acceleration, rows.jerk), rows.largest, strict=True)
     v, a, j = (np.clip(x / size, -1.0, 1.0) for x, size in scaled)
     p, r = legendre(v, range(4)), legendre(a, range(4))
@@ -24,7 +24,7 @@ def coupled(rows: SlidingRows) -> Array:
 
 
 def usual(rows: SlidingRows) -> Array:
-    """The plain model's own columns at their usual sizes: what does not average out over rows, shape (n, 5)."""
+    """Return the plain model's own columns at their usual sizes: misfit that does not average out, shape (n, 5)."""
     top_v, top_a, top_j = rows.largest
     return np.column_stack([
         rows.acceleration / top_a, rows.jerk / top_j, rows.velocity / top_v, rows.sign, np.ones(rows.sign.size),

@@ -1,4 +1,4 @@
-"""A transmission that brakes otherwise than it drives, a worm gear say: inertia and friction while slowing down."""
+"""A transmission that brakes differently from how it drives, such as a worm gear: inertia and friction when braking."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cogging and ripple: a torque that repeats so many times a radian. Orders are looked for in what the rest leaves."""
+"""Cogging and ripple: a torque that repeats over the position. Its orders are searched in the residual torque."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from stickslip.identification.strokes import SlidingRecord
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 HIGHEST = 50
-"""Cycles a turn, or waves within the range of a shorter motion, up to which are looked for."""
+"""Highest order searched: cycles per turn, or waves within the range of a shorter motion."""
 PERIOD = 1.5
-"""Ranges of motion that the longest wave of a short motion is long."""
+"""Length of the longest wave of a short motion, in ranges of motion."""
 MOST = 4
 """Orders added at a time, the strongest first."""
 
 
 PREFIX = "cogging "
-"""How the name of an order begins; its wave number follows."""
+"""Start of the name of an order; its wave number follows."""
 
 
 def order_of(cycles: float) -> Alternative:
-    """A torque that repeats `cycles` times a 2π rad of position (m of a linear axis)."""
+    """Return the alternative of a torque that repeats `cycles` times per 2π rad of position (m of a linear axis)."""
 
     def both(rows: SlidingRows) -> Array:
         def of_record(r: SlidingRecord) -> Array:
             angle = cycles * (r.position + r.origin)
             return np.column_stack([np.sin(angle), np.cos(angle)])
 
-        # Every round of a search looks for the same waves.
+        # Every round of a search evaluates the same waves.
         key = f"wave {cycles!r}"
         if key not in rows.kept:
             rows.kept[key] = rows.see(of_record)
@@ -46,12 +46,12 @@ def order_of(cycles: float) -> Alternative:
 
 
 def named_orders(names: Iterable[str]) -> list[Alternative]:
-    """The orders among the names of alternatives ("cogging 4"); others are left out."""
+    """Return the orders among the names of alternatives ("cogging 4"); others are ignored."""
     return [order_of(float(n.removeprefix(PREFIX))) for n in names if n.startswith(PREFIX)]
 
 
 def candidates(rows: SlidingRows, period: float | None) -> Array:
-    """Wave numbers that are looked for, rad⁻¹ (m⁻¹): harmonics of `period`; of the range where that is shorter."""
+    """Return the wave numbers to search, rad⁻¹ (m⁻¹): harmonics of `period`, or of the range if that is shorter."""
     whole = 2.0 * np.pi if period is None else period
     numbers = np.arange(1.0, HIGHEST + 1.0)
     if 2.0 * rows.range > whole:
@@ -62,7 +62,7 @@ def candidates(rows: SlidingRows, period: float | None) -> Array:
 def find_orders(
     rows: SlidingRows, root: Array, torque: Array, beside: Array, level: float, numbers: Sequence[float]
 ) -> list[float]:
-    """Wave numbers that the torque shows beside some columns, the strongest first (matching pursuit).
+    """Return the wave numbers that the torque shows besides some columns, the strongest first (matching pursuit).
 
     Parameters
     ----------
@@ -71,11 +71,11 @@ def find_orders(
         Square roots of the rows' weights.
     torque : array, shape (n,)
     beside : array, shape (n, k)
-        Columns that explain the torque as well.
+        Columns that also explain the torque.
     level : float
         Fc, N·m (N).
     numbers : sequence of float
-        Those looked for.
+        Wave numbers to search.
     """
     q = np.linalg.qr(beside * root[:, None])[0]
     left = root * torque
@@ -86,7 +86,7 @@ def find_orders(
     for _ in range(MOST):
         gains = [_gain(w, left) for w in waves]
         k = int(np.argmax(gains))
-        # As likely beforehand as one of all that are looked for.
+        # Every candidate has the same prior probability.
         if gains[k] < 2.0 * np.log(len(numbers)) or numbers[k] in found:
             break
         found.append(float(numbers[k]))
@@ -97,7 +97,7 @@ def find_orders(
 
 
 def _gain(wave: Array, left: Array) -> float:
-    """Twice the logarithm of the evidence for a wave."""
+    """Return twice the logarithm of the evidence for a wave."""
     a = wave.T @ wave + np.eye(2) / 0.1**2
     b = wave.T @ left
     return float(b @ np.linalg.solve(a, b)) - float(np.log(np.linalg.det(a) * 0.1**4))

@@ -1,4 +1,4 @@
-"""The friction curve has another form: viscous friction that levels off, drag, a fall of no exponential form."""
+"""A friction curve of another form: viscous friction that levels off, drag, a fall that is not exponential."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from stickslip.identification.alternatives.alternative import Alternative
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BUMPS, WIDTH = 6, 1.5
-"""Bumps over the logarithm of speed, and octaves from one to the next: a decade and a half below the highest speed."""
+"""Number of bumps over the logarithm of speed; their spacing, octaves. They reach 7.5 octaves below the highest
+speed."""
 REMEDY = "record constant speeds, at least three a decade"
 
 
 def octaves(velocity: Array, fastest: float) -> Array:
-    """Bumps (hat functions) over the logarithm of speed, the last one reaching down to rest, shape (n, 6)."""
+    """Return bumps (hat functions) over the logarithm of speed, the last one extended to rest, shape (n, 6)."""
     x = np.log2(np.maximum(np.abs(velocity), 1e-9 * fastest) / fastest) / WIDTH
     return np.maximum(0.0, 1.0 - np.abs(np.maximum(x, 1.0 - BUMPS)[:, None] + np.arange(BUMPS)))
 

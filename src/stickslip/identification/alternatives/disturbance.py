@@ -1,9 +1,10 @@
-"""A torque from outside moves the axis: the acceleration is then correlated with the misfit (closed-loop bias).
+"""An external torque that moves the axis: the acceleration is then correlated with the misfit (closed-loop bias).
 
-A disturbance d accelerates the axis by itself, by up to d / J where the loop does not hold the axis against it, and the
-drive then answers that motion. Least squares take the correlation for a smaller inertia and a later torque column, with
-a smaller misfit, so no evidence of the regression tells (Ljung 1999, 13.4; Van den Hof 1998). How much of the misfit
-moves the axis, and how much is noise of the torque column, does not show either: any part of the bias is as likely.
+A disturbance d itself accelerates the axis, by up to d / J if the loop does not hold the axis against it, and the drive
+then responds to that motion. Least squares interpret the correlation as a smaller inertia and a more delayed torque
+column, with a smaller misfit, so the evidence of the regression cannot reveal it (Ljung 1999, 13.4; Van den Hof 1998).
+The part of the misfit that moves the axis cannot be distinguished from noise of the torque column either: every part of
+the bias is equally likely.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def no_columns(rows: SlidingRows) -> Array:
-    """Return no columns: the effect is a bias of the others."""
+    """Return no columns: the effect is a bias of the other coefficients."""
     return np.zeros((rows.sign.size, 0))
 
 
@@ -31,7 +32,7 @@ DISTURBANCE = Alternative(
 
 
 def closed_loop_bias(residual: Array, gain: Array, weight: Array, inertia: float) -> Array:
-    """Return what numbers lack if the whole misfit is a torque that moves the axis freely, shape (k,).
+    """Return the bias of the numbers if the whole misfit is a torque that moves the axis freely, shape (k,).
 
     Parameters
     ----------
@@ -40,6 +41,6 @@ def closed_loop_bias(residual: Array, gain: Array, weight: Array, inertia: float
     gain : array, shape (k,)
         Covariance of the numbers with the inertia.
     inertia : float
-        kg·m² (kg)
+        Inertia, kg·m² (kg).
     """
     return gain * float(weight @ residual**2) / max(abs(inertia), 1e-300)

@@ -1,4 +1,4 @@
-"""Friction and constant torque change with time (an axis that warms up, grease that spreads), or between records."""
+"""Friction and constant torque that change with time (warm-up, grease that spreads) or between records."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ REMEDY = "warm the axis up first, and repeat moves in another order"
 
 
 def over_time(record: SlidingRecord) -> Array:
-    """Constant torque and friction that change smoothly over the record, shape (samples, 6)."""
+    """Return constant torque and friction that change smoothly over the record, shape (samples, 6)."""
     late = legendre(np.linspace(-1.0, 1.0, record.time.size), range(1, 4))
     return np.column_stack([late, record.sign[:, None] * late])
 
 
 def by_record(rows: SlidingRows) -> Array:
-    """Constant torque and friction of each record less the mean of all, shape (n, 2 records)."""
+    """Return constant torque and friction of each record minus the mean of all, shape (n, 2 records)."""
     own = list(rows.records)
     of = np.concatenate([np.full(b.centres.size, own.index(b.record)) for b in rows.blocks])
     each = (of[:, None] == np.arange(len(own))) - 1.0 / len(own)

@@ -1,7 +1,7 @@
 """A load behind a spring, or a filter in the torque's column: the second derivative of the acceleration.
 
-A motor with a load behind a spring needs T = J a - Jl²/k a'' + ..., a column with a lag of the current loop or of a
-filter, J a + lag²/2 J a'' (both Taylor series about low frequencies).
+A motor with a load behind a spring requires T = J a - Jl²/k a'' + ..., a column with the lag of a current loop or a
+filter J a + lag²/2 J a'' (both Taylor series about low frequencies).
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def second(rows: SlidingRows) -> Array:
-    """Second derivative of the acceleration; a coefficient of 1 is a mean over one row."""
+    """Return the second derivative of the acceleration; a coefficient of 1 is a mean over one row."""
     return (rows.snap * rows.period**2 / 12.0)[:, None]
 
 
 def fourth(rows: SlidingRows) -> Array:
-    """Its second and fourth."""
+    """Return the second and the fourth derivative of the acceleration."""
     return np.column_stack([second(rows)[:, 0], rows.pop * rows.period**4 / 144.0])
 
 

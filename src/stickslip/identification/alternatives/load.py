@@ -1,4 +1,4 @@
-"""Friction grows with the load (gear efficiency), or the torque constant falls with the current."""
+"""Friction that grows with the load (gear efficiency), or a torque constant that falls with the current."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def registry_for(model: Array, gravity: tuple[float, float]) -> tuple[Alternative, ...]:
-    """The alternatives about a first model of the torque.
+    """Return the alternatives that depend on a first model of the torque.
 
     Parameters
     ----------
     model : array, shape (4,)
-        Its inertia, fc, sigma2 and offset.
+        Inertia, fc, sigma2 and offset of the model.
     gravity : tuple
-        Its sine and cosine of a pendulum.
+        Sine and cosine amplitudes of a pendulum's gravity.
     """
 
     def inner(r: SlidingRecord) -> Array:

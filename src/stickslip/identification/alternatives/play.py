@@ -1,4 +1,4 @@
-"""Backlash: after braking begins the load is in the gap for a while, and the motor moves alone."""
+"""Backlash: after braking starts, the load crosses the gap for a while and the motor moves alone."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from stickslip.identification.strokes import SlidingRecord
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SPELLS = (0.0, 0.015, 0.04, 0.1)
-"""s after braking began: a gap of some hundredths of a radian is crossed in tens of milliseconds."""
+"""Bounds of the intervals after braking starts, s: a gap of some hundredths of a radian is crossed in tens of
+milliseconds."""
 
 
 def in_the_gap(record: SlidingRecord) -> Array:
-    """Acceleration in spells after braking began, shape (samples, 3)."""
+    """Return the acceleration in intervals after braking starts, shape (samples, 3)."""
     on = braking(record) > 0.0
     begins = np.concatenate([[False], on[1:] & ~on[:-1]])
     began = np.maximum.accumulate(np.where(begins, np.arange(on.size), -(10**9)))

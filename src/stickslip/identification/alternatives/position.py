@@ -15,14 +15,15 @@ from stickslip.identification.strokes import SlidingRecord
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WAVES, PERIOD = 24, 1.5
-"""Sines and cosines of one and a half times the range: a smooth function on the range is no periodic one."""
+"""Number of waves, and their longest wavelength in ranges: longer than the range, since the function is not
+periodic."""
 SIZES, SCALES = (0.01, 0.03, 0.1), (1.0, 4.0, 16.0)
-"""Parts of Fc, and waves within the range, of a random function over the position."""
+"""Size of a random function over the position, part of Fc; number of its waves within the range."""
 REMEDY = f"map the torque over the position ({name_option('method', 'cogging')}), or record over a longer way"
 
 
 def waves(rows: SlidingRows) -> Array:
-    """Sines and cosines over the position, shape (n, 2 WAVES)."""
+    """Return sines and cosines over the position, shape (n, 2 WAVES)."""
     base = 2.0 * np.pi / max(PERIOD * rows.range, 1e-300)
 
     def of_record(record: SlidingRecord) -> Array:
@@ -33,7 +34,7 @@ def waves(rows: SlidingRows) -> Array:
 
 
 def smoothness(level: tuple[float, float], count: int) -> Array:
-    """Standard deviations of the waves of a random function: its size, and how many waves it has within the range."""
+    """Return the waves' standard deviations for a random function of given size and waves within the range."""
     size, scale = level
     share = 1.0 / (1.0 + (np.repeat(np.arange(1, count // 2 + 1), 2) / scale) ** 2)
     return np.maximum(size * share / np.sqrt(np.sum(share[::2] ** 2)), 1e-5)

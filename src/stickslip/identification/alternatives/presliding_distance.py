@@ -1,4 +1,4 @@
-"""Friction is built up again behind every reversal or stop, over some way that is not known beforehand."""
+"""Friction that builds up again after every reversal or stop, over an unknown distance."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from stickslip.identification.alternatives.alternative import Alternative
 
 DISTANCES = (1e-4, 5e-4, 2.5e-3, 1.25e-2)
-"""Parts of the range of motion, five times from one to the next."""
+"""Distances of the build-up, parts of the range of motion, by factors of five."""
 ALTERNATIVES = (
     Alternative(
         "rebuilding", lambda rows: rows.see(

@@ -1,7 +1,7 @@
-"""The torque's column acts later or earlier than its row, or is spread over time.
+"""Timing of the torque's column: delayed or early relative to its row, or spread over time.
 
-The plain model has a skew near 0 rows. It may be off by several (a bus, a filter in the log), and a hold, a mean or a
-current loop is a delay to a few hundredths of a row only.
+The plain model has a skew near 0 rows. The true one may be several rows (a bus, a filter in the log), and a hold, a
+mean or a current loop equals a pure delay only to a few hundredths of a row.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def one_row(rows: SlidingRows) -> Array:
-    """What a delay of one row takes of a torque in proportion to the acceleration."""
+    """Return the effect of a delay of one row on a torque proportional to the acceleration, shape (n, 1)."""
     return (-rows.jerk * rows.period)[:, None]
 
 

@@ -1,8 +1,8 @@
-"""Torque over the angle: what depends on the position alone, on position and direction, and on velocity.
+"""Torque over the angle: its dependence on position alone, on position and direction, and on velocity.
 
 ``torque = offset + E(theta) + direction (F + O(theta)) [+ viscous v + inertia dv/dt]``: E is cogging, gravity,
-unbalance; O is friction that varies over the angle, unless a lag with direction explains it. From standstill maps
-(places at which the axis stood, forward and backward) and slow rotations; faster records are held against the map.
+unbalance; O is friction that varies over the angle, unless a lag with direction explains it. The data are standstill
+maps (points at which the axis stood, forward and backward) and slow rotations; faster records are compared to the map.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ from stickslip.machines.position_map import PositionMap, Waves
 from stickslip.models.model import Model
 
 LEVELS = "fc", "sigma2"
-"""Parameters of the model that stand among the estimates under another name."""
+"""Parameters of the model that have other names among the estimates."""
 LEAST = 60
-"""Places, for orders to be told from noise."""
+"""Fewest places to distinguish orders from noise."""
 
 
 def identify_cogging(
@@ -60,19 +60,19 @@ def identify_cogging(
     Parameters
     ----------
     records : sequence of Record
-        Channels ``position`` (rad, the same zero in all), the torque's, and as known ``position_reference`` (tells the
-        places of a standstill map) and ``velocity``. Those up to `FASTEST` are fitted, faster ones are held against
-        the result.
+        Channels ``position`` (rad, the same zero in all), the torque's, and if known ``position_reference`` (which
+        separates the places of a standstill map) and ``velocity``. Records up to `FASTEST` are fitted, faster ones are
+        compared to the result.
     torque : str
         Channel; its unit may be A.
     gear : float
-        Turns of the position's shaft for one of the slowest shaft: orders are then multiples of its inverse.
+        Turns of the position's shaft per turn of the slowest shaft: orders are then multiples of its inverse.
 
     Returns
     -------
     Identification
         ``even[n]`` and ``odd[n]``, amplitudes by order; ``details["map"]`` is the
-        `stickslip.machines.position_map.PositionMap`. A Coulomb model where the torque is in N·m.
+        `stickslip.machines.position_map.PositionMap`. A Coulomb model if the torque is in N·m.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def _usable(places: Places, records: Sequence[Record]) -> Places:
 
 
 def chosen_terms(places: Places, orders: Orders, moving: Sequence[str]) -> tuple[Fit, Choice, list[Any]]:
-    """Terms by the error on sectors, and errors of the table on the same."""
+    """Choose the terms by the error on sectors, and return the errors of the table on the same places."""
     by_sector, _ = left_out(places, orders, moving, sectors)
     by_place, _ = left_out(places, orders, moving, interleaved)
     count = chosen(by_sector)
@@ -161,7 +161,7 @@ def chosen_terms(places: Places, orders: Orders, moving: Sequence[str]) -> tuple
 
 
 def map_of(found: Fit, places: Places, unit: str, choice: Choice, bounds: tuple[float, float]) -> PositionMap:
-    """Harmonics; the table too, where it is the better one."""
+    """Return the map of the harmonics, with the table if that is better."""
 
     def waves(part: str) -> Waves:
         own = sorted((t for t in found.terms if t[0] == part), key=lambda t: t[1])
@@ -185,7 +185,7 @@ def map_of(found: Fit, places: Places, unit: str, choice: Choice, bounds: tuple[
 def _model(
     found: PositionMap, terms: Sequence[Any], lagging: Sequence[float]
 ) -> tuple[Model | None, dict[str, Any]]:
-    """A Coulomb model and the angle's part, where the torque is one and orders are whole numbers a turn."""
+    """Return a Coulomb model and the angle's part, if the torque is in N·m and orders are whole numbers per turn."""
     whole = all(n == round(n) for _, n in terms)
     if found.unit != "N·m" or not found.friction > 0.0:
         return None, {}
@@ -194,7 +194,7 @@ def _model(
 
 
 def angle_of(found: PositionMap, lagging: Sequence[float]) -> AngleMap:
-    """The map's waves, friction's relative to its level; without the orders that a lag with direction explains."""
+    """Return the map's waves, friction's relative to its level, without the orders that a lag explains."""
     own = [i for i, n in enumerate(found.odd.order) if n not in lagging]
     ripple = Harmonics(
         tuple(found.odd.order[i] for i in own), tuple(found.odd.amplitude[i] / found.friction for i in own),

@@ -1,4 +1,4 @@
-"""The fit of chosen orders, with what the motion carries, and how sure it is."""
+"""The fit of chosen orders together with the terms of the motion, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from stickslip.identification.cogging.rows import Places, least_squares
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Column = tuple[Array, float]
-"""And how large its value may be."""
+"""A column and the standard deviation of its coefficient."""
 
 TURNS = 4
-"""Fits, each with the motion, the level of friction and the delay that the one before shows."""
+"""Number of fits, each with the motion, friction level and delay from the one before."""
 STROKES = 4
-"""Strokes in motion, from which on the intervals hold what they differ by."""
+"""Fewest strokes in motion for the intervals to include the differences between them."""
 CARRIED = 0.1
-"""Of what velocity and acceleration take out of an order, not believed: both are smoothed, and friction lags."""
+"""Uncertain part of the effect of velocity and acceleration on an order: both are smoothed, and friction lags."""
 FAST = 100.0
-"""Order, beyond which friction need not follow the velocity's swing: a period of 0.06 rad is several times the travel
-before sliding of a usual contact."""
+"""Order above which friction need not follow the velocity's oscillation: its period of 0.06 rad is several times the
+usual pre-sliding distance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,21 +38,21 @@ class Fit:
     moving: tuple[str, ...]
     """Names of the columns after constant and direction."""
     first: int
-    """Columns before those of the terms."""
+    """Number of columns before those of the terms."""
 
     def pair(self, term: Term) -> Array:
-        """Cosine and sine of a term."""
+        """Return the cosine and sine coefficients of a term."""
         i = self.first + 2 * self.terms.index(term)
         return self.values[i : i + 2]
 
     def spread(self, term: Term) -> Array:
-        """Their covariance, shape (2, 2)."""
+        """Return the covariance of a term's coefficients, shape (2, 2)."""
         i = self.first + 2 * self.terms.index(term)
         return self.covariance[i : i + 2, i : i + 2]
 
 
 def fit(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Fit:
-    """Least squares; in long strokes in motion with what the motion carries at each order."""
+    """Solve least squares; for long strokes in motion, include the terms of the motion at each order."""
     if not long_strokes(places):
         return _short(places, terms, moving)
     if not moving:
@@ -61,7 +61,7 @@ def fit(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Fit:
 
 
 def _standing(places: Places, terms: Sequence[Term]) -> Fit:
-    """Least squares: at rest one noise is that of all strokes."""
+    """Solve least squares at rest, where all strokes have the same noise."""
     matrix = columns(places, terms, ())
     values = least_squares(matrix, places.torque)
     residual: Array = places.torque - matrix @ values
@@ -77,11 +77,11 @@ def _weighted(
     places: Places, matrix: Array, terms: Sequence[Term], moving: Sequence[str], beside: Array,
     answers: Mapping[str, Column],
 ) -> Fit:  # fmt: skip
-    """Least squares weighted by the noise, which the speed changes.
+    """Solve least squares weighted by the noise, which depends on the speed.
 
-    `beside`: columns of what the motion carries between the orders, shape (n, k), of the first k names. `answers` are
-    not fitted: what moves the axis at an order is in the swing too, so that a fit would take cogging's noise for
-    them. The intervals are wider by what they may do.
+    `beside`: columns of the motion's terms between the orders, shape (n, k), of the first k names. `answers` are not
+    fitted: the torque at an order also moves the axis, so a fit would confuse them with cogging's noise. The intervals
+    widen by their possible effect.
     """
     values = least_squares(matrix, places.torque)
     noise = places.torque - matrix @ values - beside @ values[2 : 2 + beside.shape[1]]
@@ -105,7 +105,7 @@ def _fit(
     terms: Sequence[Term], values: Array, covariance: Array, misfit: Array, strokes: int, residual: Array,
     moving: Sequence[str],
 ) -> Fit:  # fmt: skip
-    """Intervals wider by what the strokes differ by."""
+    """Build the fit, with intervals widened by the differences between strokes."""
     first = values.size - 2 * len(terms)
     orders = np.concatenate([np.zeros(first), np.repeat([n for _, n in terms], 2)])
     wide = widened(misfit, orders, strokes)
@@ -116,8 +116,10 @@ def _fit(
 
 
 class Laid(NamedTuple):
-    """Columns of a fit in motion: of all, the motion without its noise, and of what stands between `moving` and the
-    terms."""
+    """Columns of a fit in motion.
+
+    `matrix`: all columns; `own`: the motion without its noise; `more`: the columns between `moving` and the terms.
+    """
 
     matrix: Array
     own: Places
@@ -125,8 +127,11 @@ class Laid(NamedTuple):
 
 
 def _moved(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Fit:
-    """With velocity and acceleration as the waves of these orders show them, which holds no noise; with friction's
-    ripple following its level; and, where several speeds tell it from a lag, with the delay of the torque."""
+    """Fit in motion.
+
+    Velocity and acceleration are those of the waves at these orders, without noise; friction's ripple is proportional
+    to its level; if several speeds distinguish it from a lag, the torque's delay is estimated.
+    """
     late = "viscous" in moving and bool(terms)
     values, delay = least_squares(columns(places, terms, moving), places.torque), 0.0
     laid = _laid(places, terms, moving, values, delay)
@@ -148,7 +153,7 @@ def _moved(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Fit:
 
 
 def _laid(places: Places, terms: Sequence[Term], moving: Sequence[str], values: Array, delay: float) -> Laid:
-    """The columns with the motion, the level of friction and the delay that a fit before showed."""
+    """Return the columns with the motion, the level of friction and the delay from the previous fit."""
     own, fast = _motion(places, terms, delay)
     pairs = values[values.size - 2 * len(terms) :]
     matrix = columns(own, terms, moving)
@@ -167,22 +172,23 @@ def _laid(places: Places, terms: Sequence[Term], moving: Sequence[str], values: 
 
 
 def _apart(places: Places) -> Array:
-    """Speed over its mean, less one."""
+    """Return the speed over its mean, minus one."""
     speed = np.abs(places.velocity)
     return speed / float(np.mean(speed)) - 1.0
 
 
 def _odd(terms: Sequence[Term]) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Of the terms' columns, those of friction's ripple."""
+    """Return a mask of the terms' columns that belong to friction's ripple."""
     return np.repeat([part == "odd" for part, _ in terms], 2)
 
 
 def _motion(places: Places, terms: Sequence[Term], delay: float) -> tuple[Places, dict[str, Array]]:
-    """Places a delay before, with the velocity of slow orders and the acceleration of all, and columns of the velocity
-    of fast ones.
+    """Return the places a delay earlier, and columns of the velocity of fast orders.
 
-    Friction does not follow a velocity that swings within its travel before sliding: what it does there, in phase and
-    behind, is left free.
+    The places have the velocity of slow orders and the acceleration of all.
+
+    Friction does not follow a velocity that oscillates within the pre-sliding distance: its response in phase and in
+    quadrature is then free.
     """
     orders = sorted({n for _, n in terms})
     seen, slow = places.motion(orders, delay), places.motion([n for n in orders if n <= FAST], delay)
@@ -191,7 +197,7 @@ def _motion(places: Places, terms: Sequence[Term], delay: float) -> tuple[Places
     if not orders or orders[-1] <= FAST:
         return own, {}
     fast = seen - slow
-    # Strokes too short for a swing show none, and a column of zeros tells nothing.
+    # Strokes too short for an oscillation show none, and a column of zeros contains no information.
     swings = {"fast_viscous": fast[:, 0], "fast_lag": fast[:, 1] / np.abs(places.velocity)}
     return own, {name: column for name, column in swings.items() if np.any(column)}
 
@@ -199,9 +205,11 @@ def _motion(places: Places, terms: Sequence[Term], delay: float) -> tuple[Places
 def _answers(
     places: Places, own: Places, more: Mapping[str, Array], values: Mapping[str, float]
 ) -> dict[str, Column]:
-    """By what friction's answer to a swing of the velocity may differ from its slope over the levels and change with
-    the speed, which few speeds do not tell: by as much as the slope is, and behind it by what friction lags by if it
-    just follows an order of `FAST`."""
+    """Return possible deviations of friction's response to an oscillating velocity from its steady slope.
+
+    Few speeds do not determine how the response depends on the speed. Its size is that of the slope, and in quadrature
+    that of friction which just follows an order of `FAST`.
+    """
     speed, apart = np.abs(places.velocity), _apart(places)
     slope = float(np.sqrt(np.mean((values["viscous"] + 2.0 * values.get("curve", 0.0) * speed) ** 2)))
     behind = slope / FAST
@@ -217,25 +225,24 @@ def _answers(
 
 
 def _rippled(waves: Array, terms: Sequence[Term], level: Array) -> Array:
-    """Puts friction's level onto the waves of its ripple; what that adds to them, shape (n, 2 k).
+    """Multiply the waves of friction's ripple by its level; return the change, shape (n, 2 k).
 
-    What does not ripple (bearings beside the contact, whose friction may grow with the speed) makes the level of what
-    does swing by more than that of all: by how much is left free, with the level and, of three speeds, with the speed.
-    """
+    Friction without ripple (such as bearings, whose friction may grow with the speed) makes the level of the rippling
+    part vary by more than the whole: by how much is free, with the level and, for three speeds, with the speed."""
     added: Array = np.where(_odd(terms), waves * (level - 1.0)[:, None], 0.0)
     waves += added
     return added
 
 
 def _level(places: Places, moving: Sequence[str], values: Array) -> Array:
-    """Friction's level at every place over its mean, shape (n,)."""
+    """Return friction's level at every place over its mean, shape (n,)."""
     carried = [1, *(2 + i for i, name in enumerate(moving) if name != "inertia")]
     level = places.direction * (columns(places, (), moving)[:, carried] @ values[carried])
     return level / float(np.mean(level)) if float(np.min(level)) > 0.0 else np.ones(len(places))
 
 
 def _slopes(places: Places, terms: Sequence[Term]) -> Array:
-    """Derivatives of the terms' columns by the angle, shape (n, 2 k)."""
+    """Return the derivatives of the terms' columns by the angle, shape (n, 2 k)."""
     out = columns(places, terms, ())[:, 2 + places.beside.shape[1] :]
     slopes = np.empty_like(out)
     for i, (_, n) in enumerate(terms):
@@ -247,10 +254,10 @@ def _slopes(places: Places, terms: Sequence[Term]) -> Array:
 
 
 def _short(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Fit:
-    """Least squares in strokes too short to show the density of their noise.
+    """Solve least squares for strokes too short to show the density of their noise.
 
-    The covariance counts correlated places once. To it come what the strokes differ by (friction and what the motion
-    carries change with the speed), and a share of what velocity and acceleration took out of each order.
+    The covariance counts correlated places once. Added are the differences between the strokes (friction and the terms
+    of the motion depend on the speed), and a share of the effect of velocity and acceleration on each order.
     """
     matrix = columns(places, terms, moving)
     q, r = np.linalg.qr(matrix)

@@ -1,4 +1,4 @@
-"""A map against records in motion: whether it explains their torque, or must not be applied; who made the torque."""
+"""A map against records in motion: whether it explains their torque or must not be applied, and the torque's source."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 SAMPLES = 8.0
-"""Rows of a period of the strongest order, at least, for a map to be visible in a record."""
+"""Fewest rows per period of the strongest order for a map to be visible in a record."""
 CORNER = 100.0
-"""Hz, of the zero-phase low-pass on torque, angle and map."""
+"""Corner of the zero-phase low-pass on torque, angle and map, Hz."""
 STEADY = 0.05
-"""Part of a torque's variation that a straight line in the velocity leaves, where a speed controller made it."""
+"""Greatest unexplained part of a torque's variation for a line in the velocity to indicate a speed controller."""
 STRETCHES = 16
 STILL = 1e-6
-"""Variance of a constant velocity, of its square."""
+"""Greatest variance of a constant velocity, part of its square."""
 LATE = 5
-"""Rows by which the velocity's column may be ahead of the torque's, or behind."""
+"""Greatest offset of the velocity's column relative to the torque's, rows, in either direction."""
 MOVES = 0.2
-"""Of the usual speed, below which friction may pass from one side to the other: not judged."""
+"""Part of the usual speed below which friction may be changing sign and is not judged."""
 LONGEST = 100_000
-"""Rows, of which delays are sought."""
+"""Most rows in the search for delays."""
 DELAYS = 10
-"""Tenths of a row by which the torque may be recorded late or early, each way."""
+"""Greatest offset of the recorded torque in either direction, tenths of a row."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A record in motion. RMS of the torque that is left on its second half, the first one having been fitted."""
+    """A record in motion: RMS of the residual torque on its second half, after a fit to the first half."""
 
     with_map: float
     without: float
@@ -46,16 +46,17 @@ class Motion:
     speed: float
     visible: bool
     delay: float = 0.0
-    """s by which the torque is recorded late."""
+    """Delay of the recorded torque, s."""
 
 
 def in_motion(record: Record, torque: str, found: PositionMap) -> Motion | None:
-    """Torque = map + friction sgn(v) + inertia dv/dt: fitted on the first half, judged on the second.
+    """Fit torque = map + friction sgn(v) + inertia dv/dt on the first half of a record, and judge it on the second.
 
-    The acceleration is the recorded velocity's or the angle's, whichever leaves less on the first half: rows that a
-    computer stamps late spoil a second derivative of the angle, a velocity made in the drive only lags.
+    The acceleration is the recorded velocity's or the angle's, whichever has the smaller residual on the first half:
+    rows with delayed time stamps of a computer corrupt a second derivative of the angle; a velocity from the drive only
+    lags.
 
-    None for a record that does not move faster than `FASTEST`.
+    Return None for a record that does not move faster than `FASTEST`.
     """
     t, q = record.time, record["position"]
     v = velocity_of(record)
@@ -93,7 +94,7 @@ def in_motion(record: Record, torque: str, found: PositionMap) -> Motion | None:
 def _judged(
     matrix: Array, torque: Array, after: Mapping[float, Array], fitted: Flags, judged: Flags
 ) -> tuple[float, Motion]:
-    """What friction and inertia leave where they are fitted, with the delay of the map that leaves least."""
+    """Return the residual of friction and inertia where they are fitted, with the best delay of the map."""
     solve = np.linalg.pinv(matrix[fitted])
 
     def left(torque: Array) -> tuple[float, float, Array]:
@@ -107,23 +108,23 @@ def _judged(
 
 
 class Spectral:
-    """A zero-phase low-pass with exact derivatives, by the Fourier transform; its ends are not to be used."""
+    """A zero-phase low-pass with exact derivatives, by the Fourier transform; its ends are invalid."""
 
     def __init__(self, size: int, period: float) -> None:
         hertz = np.fft.rfftfreq(size, period)
         self.size, self.shape, self.along = size, 1.0 / (1.0 + (hertz / CORNER) ** 4), 2j * math.pi * hertz
 
     def __call__(self, x: Array, derivatives: int = 0, delay: float = 0.0) -> Array:
-        """The signal, filtered, differentiated so often, later by so many s."""
+        """Return the filtered signal, with this number of derivatives, delayed by `delay` s."""
         factor = self.shape * self.along**derivatives * np.exp(-delay * self.along)
         return np.fft.irfft(np.fft.rfft(x) * factor, self.size)
 
 
 def speed_control(record: Record, torque: str) -> tuple[float, float] | None:
-    """Slope, and share left, of the straight line of a torque over the velocity that a speed controller made.
+    """Return slope and unexplained share of a line of torque over velocity that a speed controller made; None without.
 
-    A controller's torque falls as the measured speed rises and is a straight line of it, stretch by stretch; friction
-    rises with it.
+    A controller's torque decreases with the measured speed and is a line of it in each segment; friction increases with
+    it.
     """
     if "velocity" not in record.channels:
         return None

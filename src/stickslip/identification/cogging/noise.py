@@ -1,8 +1,8 @@
-"""Noise of a torque over the angle: the density that the residual has at each order, stroke by stroke.
+"""Noise of a torque over the angle: the spectral density of the residual at each order, stroke by stroke.
 
-A loop that holds a speed takes slow noise out of the torque and leaves the fast, the less the slower it turns: counted
-as white and alike in all strokes, it would be too much at low orders by a power of ten. What the strokes differ by
-beyond their noise makes the intervals wider.
+A loop that controls a speed removes slow noise from the torque and keeps fast noise, depending on the speed: white
+noise, equal in all strokes, would be far too large at low orders. Differences between the strokes beyond their noise
+widen the intervals.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ Integers = np.ndarray[Any, np.dtype[np.intp]]
 
 LAGS = 60
 FADED = 0.05
-"""Correlation of the residual from which on places count as independent."""
+"""Correlation of the residual below which places count as independent."""
 LONG = 400
-"""Places of a stroke from which on it shows the density of its noise."""
+"""Fewest places of a stroke to determine the density of its noise."""
 MOST = 0.95
-"""Share of the places that must lie in such strokes."""
+"""Least share of the places in such strokes."""
 UNEVEN = 4.0
-"""Ratio of a stroke's steps, between tenths, up to which it shows it."""
+"""Greatest ratio of a stroke's steps, between deciles, to determine it."""
 BAND = 24
-"""Bins on each side over which a density is averaged, at least; a quarter of the bin's number where that is more."""
+"""Fewest bins on each side over which a density is averaged; a quarter of the bin's number if that is more."""
 NORMAL = 1.96
 BESIDE = 2
-"""Bins on each side of a fitted order, from which the fit has taken noise."""
+"""Bins on each side of a fitted order, whose noise the fit has reduced."""
 
 
 def memory(residual: Array, stroke: Integers) -> float:
-    """Places over which a residual is correlated within a stroke: what the variance of a mean is greater by."""
+    """Return the places over which a residual is correlated within a stroke: the factor on the variance of a mean."""
     power, total = float(residual @ residual), 1.0
     for lag in range(1, min(LAGS, residual.size - 1)):
         same = stroke[lag:] == stroke[:-lag]
@@ -49,7 +49,7 @@ def memory(residual: Array, stroke: Integers) -> float:
 
 
 def long_strokes(places: Places) -> list[Integers]:
-    """Rows of each stroke that shows the density of its noise; none where too many places lie in shorter ones."""
+    """Return the rows of strokes that determine the density of their noise; none if too many places are in others."""
     edges = np.flatnonzero(np.diff(places.stroke) != 0) + 1
     rows = [r for r in np.split(np.arange(len(places)), edges) if r.size >= LONG and _even(places.angle[r])]
     return rows if sum(r.size for r in rows) >= MOST * len(places) else []
@@ -62,14 +62,14 @@ def _even(angle: Array) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Of each long stroke the rows, and the density of its noise."""
+    """Rows of each long stroke, and the density of its noise."""
 
     rows: tuple[Integers, ...]
     density: tuple[Array, ...]
 
     @classmethod
     def of(cls, places: Places, noise: Array, orders: Sequence[float]) -> Noise:
-        """From what a fit of these orders left, shape (n,)."""
+        """Estimate the density from the residual of a fit of these orders, shape (n,)."""
         rows = long_strokes(places)
         spacing = [float(np.ptp(places.angle[r])) / (r.size - 1.0) for r in rows]
         fitted = np.array([0.0, *sorted(set(orders))]) / (2.0 * math.pi)
@@ -78,11 +78,11 @@ class Noise:
         )
 
     def whitened(self, columns: Array) -> list[Array]:
-        """The columns of each stroke, shape (m, k), by orders, in standard deviations of the noise at each."""
+        """Return the columns of each stroke, shape (m, k), by orders, in standard deviations of the noise at each."""
         return self._weighted(columns, -0.5)
 
     def spread(self, columns: Array) -> list[Array]:
-        """Covariance of what the noise adds to the products of each stroke's columns with the torque, shape (k, k)."""
+        """Return the noise covariance of the products of each stroke's columns with the torque, shape (k, k)."""
         return [x.T @ x for x in self._weighted(columns, 0.5)]
 
     def _weighted(self, columns: Array, power: float) -> list[Array]:
@@ -98,9 +98,9 @@ class Noise:
 
 
 def density_of(residual: Array, fitted: Array) -> Array:
-    """Power of each bin of the Fourier transform for one place, without what is near `fitted` (periods a place).
+    """Return the power of each Fourier bin per place, without the bins near `fitted` (periods per place).
 
-    The transform has a power of two of places, shape (power / 2 + 1,).
+    The number of places is padded to a power of two, shape (power / 2 + 1,).
     """
     taper = np.hanning(residual.size)
     size = 1 << math.ceil(math.log2(residual.size))
@@ -119,11 +119,11 @@ def density_of(residual: Array, fitted: Array) -> Array:
 
 
 def excess(misfit: Array, orders: Array, strokes: int) -> Array:
-    """What the strokes differ by, in variances of their noise, at least 1, shape (k,).
+    """Return the differences between strokes in variances of their noise, at least 1, shape (k,).
 
-    `misfit`: of each column the squared size in the residual, in variances, added over the strokes.
+    `misfit`: each column's squared size in the residual, in variances, summed over the strokes.
 
-    Cosine and sine of an order that both parts hold leave the same in a stroke; of what is no wave, the mean tells.
+    An order in both parts has the same residual for cosine and sine in a stroke; for levels the mean is used.
     """
     out = np.ones(orders.size)
     levels = np.flatnonzero(orders == 0.0)
@@ -138,7 +138,7 @@ def excess(misfit: Array, orders: Array, strokes: int) -> Array:
 
 
 def widened(misfit: Array, orders: Array, strokes: int) -> Array:
-    """What standard deviations are greater by: few strokes tell what they differ by only roughly (Student)."""
+    """Return the factors on standard deviations, with Student's quantile for few strokes."""
     out = np.sqrt(excess(misfit, orders, strokes))
     for n in np.unique(orders[orders > 0.0]):
         own = np.flatnonzero(orders == n)

@@ -1,7 +1,7 @@
-"""Which orders a torque over the angle holds, in both directions alike or opposed; what is left out says how many.
+"""Orders of a torque over the angle, even or odd in the direction; their number is chosen by cross-validation.
 
-Orders are taken one by one, the one that explains most first (orthogonal matching pursuit, ``pati1993``). Scores of all
-orders come from one Fourier transform of the residual over the angle; what is taken is fitted exactly.
+Orders are chosen one by one, the one that explains most first (orthogonal matching pursuit, ``pati1993``). Scores of
+all orders come from one Fourier transform of the residual over the angle; the chosen ones are fitted exactly.
 """
 
 from __future__ import annotations
@@ -23,45 +23,45 @@ Term = tuple[Part, float]
 PARTS: tuple[Part, Part] = ("even", "odd")
 
 MOST = 60
-"""Orders, of both parts together."""
+"""Most orders of both parts together."""
 SURE = 10.0
-"""Beyond twice the logarithm of how many are tried: what an order explains, in variances of the noise."""
+"""Least explained power of an order, variances of the noise, beyond twice the logarithm of the number tried."""
 FOLDS, SECTORS = 4, 12
 HIGHEST = 1500
 RESOLVED = 0.8
-"""Of the Nyquist order of the places."""
+"""Highest order, part of the Nyquist order of the places."""
 STEADY = 1e-3
-"""Acceleration, of the squared speed, below which the speed is constant."""
+"""Acceleration below which the speed is constant, part of the squared speed."""
 BENT = 1.2
-"""Between the speeds of a curve, at least."""
+"""Least ratio between the speeds of a curve."""
 WHOLE = 0.25
-"""Of a turn, from which on orders are whole numbers a turn; below, halves of the way travelled."""
+"""Least range, turns, for orders to be whole numbers per turn; below, they are halves of the range."""
 WARMS = 30.0
-"""s, from which on friction's level may have changed."""
+"""Time after which friction's level may have changed, s."""
 ENOUGH = 1.005
-"""Of the least error, within which fewer orders are taken."""
+"""Ratio to the least error within which fewer orders are chosen."""
 
 
 @dataclass(frozen=True)
 class Orders:
-    """What is tried: ``base``, ``2 base``, ... up to ``count base``, 1/rad."""
+    """Candidate orders: ``base``, ``2 base``, ... up to ``count base``, 1/rad."""
 
     base: float
     count: int
 
     @property
     def highest(self) -> float:
-        """1/rad"""
+        """The highest candidate, 1/rad."""
         return self.base * self.count
 
     @property
     def whole(self) -> bool:
-        """Whether orders are whole numbers a turn."""
+        """Whether orders are whole numbers per turn."""
         return self.base == 1.0
 
 
 def grid_of(places: Places, gear: float = 1.0) -> Orders:
-    """The orders that the places can show."""
+    """Return the orders that the places can resolve."""
     way, spacing = float(np.ptp(places.angle)), places.spacing
     nyquist = math.pi / spacing if math.isfinite(spacing) and spacing > 0.0 else 1.0
     base = 1.0 if way > WHOLE * 2.0 * math.pi else math.pi / max(way, 1e-9)
@@ -71,8 +71,11 @@ def grid_of(places: Places, gear: float = 1.0) -> Orders:
 
 
 def columns(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Array:
-    """Constant, direction, velocity and acceleration where it moved, what else the places name, then cosine and sine of
-    every term."""
+    """Return the columns of a fit.
+
+    Constant, direction, velocity and acceleration in motion, further columns of the places, then cosine and sine of
+    every term.
+    """
     d = places.direction
     out = [np.ones(len(places)), d]
     speed = np.abs(places.velocity)
@@ -89,12 +92,15 @@ def columns(places: Places, terms: Sequence[Term], moving: Sequence[str]) -> Arr
 
 
 def moving_columns(places: Places) -> tuple[str, ...]:
-    """ "viscous", where there is more than one speed (else friction's level has it), "curve" where there are three;
-    "drift", where friction was long enough seen to change; "inertia", where speed varies."""
+    """Return the names of the columns in motion.
+
+    "viscous" for more than one speed (otherwise friction's level includes it), "curve" for three; "drift" if friction
+    was recorded long enough to change; "inertia" if the speed varies.
+    """
     speed = np.abs(places.velocity)
     low, second, third, high = np.percentile(
         speed, [10, 40, 60, 90]
-    ).tolist()  # of two, both are in the middle
+    ).tolist()  # of two speeds, both are in the middle
     several, three = high > 1.5 * low, high > BENT * third and second > BENT * low
     swings = float(np.percentile(np.abs(places.acceleration), 90)) > STEADY * float(np.median(speed**2))
     return (
@@ -109,7 +115,7 @@ def moving_columns(places: Places) -> tuple[str, ...]:
 
 
 class Scores:
-    """What every order explains of a residual, from sums over a fine grid of the angle."""
+    """Explained power of every order in a residual, from sums over a fine grid of the angle."""
 
     def __init__(self, places: Places, orders: Orders) -> None:
         self.places, self.orders = places, orders
@@ -125,14 +131,14 @@ class Scores:
         self.det = np.maximum(self.cc * self.ss - self.cs**2, 1e-9 * n * n)
 
     def __call__(self, residual: Array) -> Array:
-        """Power of the residual that cosine and sine of each order explain, shape (count,)."""
+        """Return the residual's power that cosine and sine of each order explain, shape (count,)."""
         seen = np.fft.rfft(np.bincount(self.cell, residual, self.size))[1 : self.orders.count + 1]
         c, s = seen.real, -seen.imag
         return (self.ss * c * c - 2.0 * self.cs * c * s + self.cc * s * s) / self.det
 
 
 def path(places: Places, orders: Orders, moving: Sequence[str], most: int = MOST) -> list[Term]:
-    """Terms in the order in which they are taken, as long as each explains more than chance does."""
+    """Return the terms in the order of choice, as long as each explains more than chance."""
     scores = Scores(places, orders)
     basis, _ = np.linalg.qr(columns(places, (), moving))
     residual = places.torque - basis @ (basis.T @ places.torque)
@@ -167,7 +173,7 @@ def path(places: Places, orders: Orders, moving: Sequence[str], most: int = MOST
 
 
 def sectors(places: Places) -> Integers:
-    """Fold of every place: whole sectors of the way, every fourth in one fold."""
+    """Return the fold of every place: whole sectors of the range, every fourth in one fold."""
     low, way = float(places.angle.min()), float(np.ptp(places.angle))
     turn = min(way, 2.0 * math.pi)
     return (
@@ -176,7 +182,7 @@ def sectors(places: Places) -> Integers:
 
 
 def interleaved(places: Places) -> Integers:
-    """Fold of every place: every other one, the same in both directions."""
+    """Return the fold of every place: every other one, the same in both directions."""
     return (np.round(places.angle / places.spacing).astype(np.intp)) % 2
 
 
@@ -184,7 +190,7 @@ Fold = Callable[[Places], Integers]
 
 
 def left_out(places: Places, orders: Orders, moving: Sequence[str], fold: Fold) -> tuple[Array, int]:
-    """RMS on what was left out by number of terms, each fold with terms of its own; the largest number."""
+    """Return the RMS on places left out by number of terms, chosen separately in each fold; and the largest number."""
     number = fold(places)
     squares: list[Array] = []
     for f in range(int(number.max()) + 1):
@@ -197,7 +203,7 @@ def left_out(places: Places, orders: Orders, moving: Sequence[str], fold: Fold) 
 
 
 def growing(fitted: Places, out: Places, terms: Sequence[Term], moving: Sequence[str]) -> Array:
-    """Sum of squares on `out` with the first 0, 1, 2, ... terms, from one triangular factor."""
+    """Return the sum of squares on `out` with the first 0, 1, 2, ... terms, from one triangular factor."""
     matrix, other = columns(fitted, terms, moving), columns(out, terms, moving)
     q, r = np.linalg.qr(matrix)
     seen = q.T @ fitted.torque
@@ -213,10 +219,10 @@ def growing(fitted: Places, out: Places, terms: Sequence[Term], moving: Sequence
 def about_motion(
     places: Places, orders: Orders, moving: Sequence[str], fold: Fold, count: int
 ) -> tuple[float, float]:
-    """RMS on what was left out without waves, and with the first `count` terms that each fold shows.
+    """Return the RMS on places left out without waves, and with the first `count` terms of each fold.
 
-    What the motion carries is fitted to all places: the others alone extrapolate it, and of records in motion what
-    follows a reversal or an acceleration in a sector that was left out may be seen there only.
+    The terms of the motion are fitted to all places: the others alone would extrapolate them, and the effects of a
+    reversal or an acceleration may occur only in the sector left out.
     """
     number, torque, beside = fold(places), places.torque, places.beside.shape[1]
     basis, _ = np.linalg.qr(columns(places, (), moving))
@@ -233,5 +239,5 @@ def about_motion(
 
 
 def chosen(errors: Array) -> int:
-    """The fewest terms whose error is within `ENOUGH` of the least."""
+    """Return the fewest terms whose error is within `ENOUGH` of the least."""
     return int(np.flatnonzero(errors <= ENOUGH * float(errors.min()))[0])

@@ -1,4 +1,4 @@
-"""What orders may be mistaken for: a lag with direction, an eccentric encoder, gravity, orders beyond the sampling."""
+"""Other explanations of orders: a lag with direction, an eccentric encoder, gravity, orders beyond the sampling."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from stickslip.identification.cogging.fitting import Fit
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SAME = 0.7
-"""Share of an order's power that the explanation must give."""
+"""Least share of an order's power that the explanation must account for."""
 SEEN = 4.0
 """Standard deviations by which sidebands must exceed zero."""
 
 
 @dataclass(frozen=True)
 class Lag:
-    """The angle by which the even part lags behind with the direction, rad, and the orders of the half difference that
-    it explains."""
+    """The lag of the even part with the direction.
+
+    `angle` is in rad; `orders` are the orders of half the difference that it explains.
+    """
 
     angle: float
     std: float
@@ -29,7 +31,7 @@ class Lag:
 
 
 def lag_of(fit: Fit) -> Lag | None:
-    """The lag from the largest order that both parts hold: ``E(theta - lag d)`` is ``E - lag d dE/dtheta``."""
+    """Estimate the lag from the largest order in both parts: ``E(theta - lag d)`` is ``E - lag d dE/dtheta``."""
     both = [n for part, n in fit.terms if part == "odd" and ("even", n) in fit.terms]
     if not both:
         return None
@@ -46,7 +48,7 @@ def _derivative(pair: Array, order: float) -> Array:
 
 
 def _lag(fit: Fit, order: float) -> tuple[float, float, float]:
-    """Lag, share of the odd part's power that it explains, standard deviation."""
+    """Return the lag, the share of the odd part's power that it explains, and its standard deviation."""
     slope, odd = _derivative(fit.pair(("even", order)), order), fit.pair(("odd", order))
     size = float(slope @ slope)
     angle = -float(slope @ odd) / size
@@ -55,7 +57,7 @@ def _lag(fit: Fit, order: float) -> tuple[float, float, float]:
 
 
 def _left(fit: Fit, order: float, angle: float) -> float:
-    """Share of the odd part's power that a lag leaves."""
+    """Return the share of the odd part's power that a lag does not explain."""
     odd = fit.pair(("odd", order))
     rest = odd + angle * _derivative(fit.pair(("even", order)), order)
     return float(rest @ rest) / float(odd @ odd)
@@ -63,7 +65,7 @@ def _left(fit: Fit, order: float, angle: float) -> float:
 
 @dataclass(frozen=True)
 class Eccentricity:
-    """An error of the encoder of `order` periods a turn, rad: it moves power to both sides of every order alike."""
+    """An encoder error of `order` periods per turn, rad: it creates equal sidebands on both sides of every order."""
 
     order: int
     angle: float
@@ -73,11 +75,10 @@ class Eccentricity:
 
 
 def eccentricities(fit: Fit) -> list[Eccentricity]:
-    """Errors of order 1 and 2 of the angle, from the sidebands of the largest order.
+    """Estimate angle errors of order 1 and 2 from the sidebands of the largest order.
 
-    With ``theta + e cos(k theta + p)`` measured, an order n of complex amplitude A has sidebands
-    ``i n e A exp(+-i p) / 2`` at n + k and n - k; a torque whose size varies over the turn has sidebands
-    without the factor i.
+    If ``theta + e cos(k theta + p)`` is measured, an order n of complex amplitude A has sidebands ``i n e A exp(+-i p)
+    / 2`` at n + k and n - k; a torque whose size varies over the turn has sidebands without the factor i.
     """
     even = [n for part, n in fit.terms if part == "even"]
     if not even:
@@ -99,5 +100,5 @@ def eccentricities(fit: Fit) -> list[Eccentricity]:
 
 
 def _complex(pair: Array) -> complex:
-    """A cos(n theta + p) as A exp(i p)."""
+    """Return A cos(n theta + p) as A exp(i p)."""
     return complex(pair[0], -pair[1])

@@ -21,16 +21,16 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 ROUND = 0.999 * 2.0 * math.pi
 ALIKE = 0.9
-"""Ratio of two errors, beyond which neither is the better one."""
+"""Ratio of two errors above which neither form is better."""
 PERIODS = 8
-"""Of the strongest order, in the picture."""
+"""Periods of the strongest order in the picture."""
 MANY = 2000
-"""Points of a picture, at most."""
+"""Most points of a picture."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Errors on what was left out: references every other one, and whole sectors, of harmonics and of a table."""
+    """Errors on data left out (every other reference, and whole sectors) of harmonics and of a table."""
 
     nothing: tuple[float, float]
     harmonics: tuple[float, float]
@@ -38,13 +38,13 @@ class Choice:
 
     @property
     def form(self) -> str:
-        """Sectors decide; where harmonics say nothing of a sector that they have not seen, the places between."""
+        """The form chosen by sectors; if harmonics do not predict unseen sectors, by the places between."""
         which = 0 if self.harmonics[1] > ALIKE * self.nothing[1] else 1
         return "table" if self.table[which] < ALIKE * self.harmonics[which] else "harmonics"
 
 
 def estimates_of(fit: Fit, unit: str, lag: Lag | None, eccentric: Sequence[Eccentricity]) -> list[Estimate]:
-    """Levels, then amplitude of every order, then what explains some of them."""
+    """Return the levels, then the amplitude of every order, then explanations of some of them."""
     names = ["offset", "friction", *fit.moving]
     known = {
         "offset": ("T_0", ""), "friction": ("F_C", ""), "viscous": ("sigma_2", "·s/rad"), "curve": ("F_2", "·s²/rad²"),
@@ -91,7 +91,7 @@ def notes_of(
     found: PositionMap, fit: Fit, orders: Orders, choice: Choice, lag: Lag | None, eccentric: Sequence[Eccentricity],
     places: Places,
 ) -> list[str]:  # fmt: skip
-    """What the numbers mean, one sentence each."""
+    """Explain the numbers, one sentence each."""
     unit = found.unit
     even = sum(part == "even" for part, _ in fit.terms)
     out = [
@@ -120,7 +120,7 @@ def notes_of(
 
 
 def remarks_of(fit: Fit, orders: Orders, lag: Lag | None, eccentric: Sequence[Eccentricity]) -> list[str]:
-    """What orders may be mistaken for, one sentence each."""
+    """Report other explanations of orders, one sentence each."""
     out: list[str] = []
     if lag is not None:
         listed = ", ".join(f"{n:g}" for n in lag.orders)
@@ -144,7 +144,7 @@ def remarks_of(fit: Fit, orders: Orders, lag: Lag | None, eccentric: Sequence[Ec
 
 
 def motion_notes(name: str, unit: str, motion: Motion | None, line: tuple[float, float] | None) -> list[str]:
-    """What a record in motion says of the map; who made its torque."""
+    """Report a record in motion: its agreement with the map, and a speed controller as the torque's source."""
     out: list[str] = []
     if motion is not None and not motion.visible:
         out.append(
@@ -170,7 +170,7 @@ def motion_notes(name: str, unit: str, motion: Motion | None, line: tuple[float,
 
 
 def pictures_of(places: Places, fit: Fit, found: PositionMap) -> tuple[Picture, ...]:
-    """Torque over the angle with the map and its interval; the orders."""
+    """Draw the torque over the angle with the map and its interval, and the orders."""
     if not len(places):
         return ()
     return (_over_angle(places, fit, found), *([_spectrum(fit, found)] if fit.terms else []))
@@ -198,7 +198,7 @@ def _over_angle(places: Places, fit: Fit, found: PositionMap) -> Picture:
 
 
 def shown_of(places: Places, fit: Fit) -> tuple[float, float]:
-    """Angles of `PERIODS` periods of the strongest order, in the middle; the whole way where it has fewer."""
+    """Return the angles of `PERIODS` periods of the strongest order, in the middle; the whole range if it has fewer."""
     low, high = float(places.angle.min()), float(places.angle.max())
     if not fit.terms:
         return low, high
@@ -208,7 +208,7 @@ def shown_of(places: Places, fit: Fit) -> tuple[float, float]:
 
 
 def interval_of(fit: Fit, angle: Array) -> Array:
-    """Half the 95 % interval of the even part at angles, shape (n,)."""
+    """Return half the 95 % interval of the even part at angles, shape (n,)."""
     zeros = np.zeros(angle.size)
     at = Places(
         angle, zeros, zeros, zeros, zeros, np.zeros(angle.size, dtype=np.intp), zeros, zeros, np.zeros((angle.size, 2))

@@ -1,8 +1,7 @@
-"""From records to places: angle, torque and direction of a standstill map or of a slow rotation.
+"""Conversion of records to places: angle, torque and direction of a standstill map or of a slow rotation.
 
-At a place where the axis stood, friction has the sign of the way that led there; after a turn-round it keeps its old
-sign for a while, so that what follows a reversal closely is left out. Rows of one place are not independent: they are
-averaged.
+At a place where the axis stood, friction has the sign of the motion towards it; after a reversal it keeps its old sign
+for a while, so places shortly after one are left out. Rows of one place are not independent: they are averaged.
 """
 
 from __future__ import annotations
@@ -21,45 +20,45 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Integers = np.ndarray[Any, np.dtype[np.intp]]
 
 FASTEST = 1.0
-"""rad/s, beyond which the rotor's inertia, not the motor, carries the cogging."""
+"""Greatest speed, rad/s; above it the rotor's inertia, not the motor, carries the cogging."""
 AFTER = 0.1, 0.02
-"""rad, and part of the stroke, left out after a turn-round: the smaller of the two."""
+"""Travel left out after a reversal: rad, and part of the stroke, whichever is less."""
 GAP = 5.0
 """Median time steps without a row that end a place."""
 STANDS = 8
-"""Places, at least, that make a standstill map."""
+"""Fewest places of a standstill map."""
 SETTLES = 20
-"""Rows of a place beyond which its first half, the way there, is left out."""
+"""Rows of a place above which its first half, the approach, is left out."""
 CELLS = 8192
-"""Of a turn, in which rows of a rotation are averaged."""
+"""Cells per turn in which rows of a rotation are averaged."""
 PART = 16
-"""Of a stroke, over which velocity is averaged on each side: friction lags behind faster changes."""
+"""Divisor of a stroke for averaging the velocity on each side: friction lags behind faster changes."""
 WINDOW = 0.01
-"""s, over which a velocity is taken on each side."""
+"""Window of a velocity on each side, s."""
 CLOSED = 1.5
 """Widest gap between the last angle of a turn and the first, in median spacings: places scatter by half of one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """What is fitted, in the order in which it was measured.
+    """Data of a fit, in the order of measurement.
 
     Attributes
     ----------
     angle : array, shape (n,)
         rad
     torque : array, shape (n,)
-        Or current.
+        Torque or current.
     direction : array, shape (n,)
         +1 or -1.
     velocity, acceleration : array, shape (n,)
         rad/s, a running mean along the stroke, and rad/s²; 0 at standstill.
     stroke : array of int, shape (n,)
-        Number of the way without reversal.
+        Number of the motion without reversal.
     width : array, shape (n,)
         Angle over which the rows were averaged, rad; 0 at standstill.
     time : array, shape (n,)
-        s, one record after another.
+        s, with the records in sequence.
     swing : array, shape (n, 2)
         Velocity without its running mean, rad/s, and acceleration, rad/s², from neighbouring rows; 0 at standstill.
     """
@@ -78,22 +77,22 @@ class Places:
         return int(self.angle.size)
 
     def at(self, rows: Any) -> Places:
-        """Some of the rows."""
+        """Return some of the rows."""
         return type(self)(*(getattr(self, n)[rows] for n in self.__dataclass_fields__))
 
     @property
     def beside(self) -> Array:
-        """Columns of what else the torque may hold, shape (n, k)."""
+        """Columns of other torque components, shape (n, k)."""
         return np.zeros((len(self), 0))
 
     def damping(self, order: float) -> Array:
-        """What the mean over `width` leaves of a wave of this order, shape (n,)."""
+        """Return the attenuation of a wave of this order by the mean over `width`, shape (n,)."""
         return np.sinc(order * self.width / (2.0 * math.pi))
 
     def motion(self, orders: Sequence[float], late: float = 0.0) -> Array:
-        """Velocity and acceleration without their noise: running mean and waves of these orders, shape (n, 2).
+        """Return velocity and acceleration without their noise: running mean and waves of these orders, shape (n, 2).
 
-        `late`: s before each place, at which the waves are taken.
+        `late`: time before each place at which the waves are evaluated, s.
         """
         out = np.column_stack([self.velocity, np.zeros(len(self))])
         edges = np.flatnonzero(np.diff(self.stroke) != 0) + 1
@@ -113,13 +112,13 @@ class Places:
 
 
 def waves_of(angle: Array, orders: Sequence[float]) -> Array:
-    """Ones, then cosines and sines of these orders, shape (n, 2 k + 1)."""
+    """Return ones, then cosines and sines of these orders, shape (n, 2 k + 1)."""
     angles = np.outer(angle, orders)
     return np.column_stack([np.ones(angle.size), np.cos(angles), np.sin(angles)])
 
 
 def least_squares(matrix: Array, right: Array) -> Array:
-    """Values of the columns, by an orthogonal factor, which is not formed: the right side is turned along with them."""
+    """Solve least squares by an orthogonal factor that is not formed: the right side is transformed with the matrix."""
     r: Array = np.asarray(np.linalg.qr(np.column_stack([matrix, right]), mode="r"))
     count: int = matrix.shape[1]
     turned: Array = r[:count, count] if right.ndim == 1 else r[:count, count:]
@@ -127,7 +126,7 @@ def least_squares(matrix: Array, right: Array) -> Array:
 
 
 def places_of(record: Record, torque: str) -> tuple[Places, bool]:
-    """The places of a record; whether it is a standstill map."""
+    """Return the places of a record, and whether it is a standstill map."""
     t, q, y = record.time, record["position"], record[torque]
     good = np.isfinite(t) & np.isfinite(q) & np.isfinite(y)
     t, q, y = t[good], q[good], y[good]
@@ -146,7 +145,7 @@ def places_of(record: Record, torque: str) -> tuple[Places, bool]:
 
 
 def velocity_of(record: Record) -> Array:
-    """The recorded velocity, or the slope of the position over `WINDOW` on each side, rad/s."""
+    """Return the recorded velocity, or the slope of the position over `WINDOW` on each side, rad/s."""
     if "velocity" in record.channels:
         return record["velocity"]
     t, q = record.time, record["position"]
@@ -157,7 +156,7 @@ def velocity_of(record: Record) -> Array:
 
 
 def joined(parts: Sequence[Places]) -> Places:
-    """All records in one, their strokes and times counted on."""
+    """Join all records, with their strokes and times numbered consecutively."""
     count, late, out = 0, 0.0, list[Places]()
     for p in parts:
         out.append(replace(p, stroke=p.stroke + count, time=p.time + late))
@@ -167,9 +166,9 @@ def joined(parts: Sequence[Places]) -> Places:
 
 
 def bounds_of(places: Places, records: Sequence[Record]) -> tuple[float, float]:
-    """Smallest and largest angle of a map, rad; a whole turn apart if its last place is the neighbour of its first.
+    """Return the smallest and largest angle of a map, rad; a whole turn apart if its last place adjoins its first.
 
-    The rows that are left out about a turn-round count: the axis was there, and harmonics go on over their width.
+    Rows left out near a reversal count: the axis was there, and harmonics extend over their width.
     """
     low, high = float(places.angle.min()), float(places.angle.max())
     about = AFTER[0] + 3.0 * places.spacing
@@ -186,7 +185,7 @@ def bounds_of(places: Places, records: Sequence[Record]) -> tuple[float, float]:
 
 
 def _stands(t: Array, q: Array, reference: Array | None) -> Integers | None:
-    """Number of the place of every row, -1 for none; None where the record is no standstill map."""
+    """Return the number of every row's place, -1 for none; None if the record is not a standstill map."""
     if reference is not None:
         new = np.concatenate([[True], np.abs(np.diff(reference)) > 1e-9])
         if STANDS <= np.count_nonzero(new) <= 0.5 * t.size:
@@ -207,7 +206,7 @@ def _stands(t: Array, q: Array, reference: Array | None) -> Integers | None:
 
 
 def _standing(group: Integers, t: Array, q: Array, y: Array, way: Array) -> Places:
-    """The mean of every place, with the direction that led there."""
+    """Return the mean of every place, with the direction of the motion towards it."""
     names, at = np.unique(group[group >= 0], return_inverse=True)
     rows = np.flatnonzero(group >= 0)
     size = np.bincount(at)
@@ -223,12 +222,12 @@ def _standing(group: Integers, t: Array, q: Array, y: Array, way: Array) -> Plac
 
 
 def _settled(angle: Array, torque: Array, way: Array, time: Array) -> Places:
-    """Directions and strokes, without what follows a turn-round too closely."""
+    """Return places with directions and strokes, without those shortly after a reversal."""
     step = np.diff(way, prepend=way[0])
     if step.size > 1:
         step[0] = step[1]
     sign = np.sign(step)
-    for i in range(1, sign.size):  # where it did not move, the last direction holds
+    for i in range(1, sign.size):  # without motion, the last direction applies
         if sign[i] == 0.0:
             sign[i] = sign[i - 1]
     stroke = np.concatenate([[0], np.cumsum(np.diff(sign) != 0.0)]).astype(np.intp)
@@ -247,7 +246,7 @@ def _settled(angle: Array, torque: Array, way: Array, time: Array) -> Places:
 
 
 def _rotation(t: Array, q: Array, y: Array, velocity: Array) -> Places:
-    """Slow rows in motion, averaged over cells of the angle within a stroke."""
+    """Average slow rows in motion over cells of the angle within a stroke."""
     slope = np.gradient(velocity, t + 1e-12 * np.arange(t.size))
     reach = max(1, round(WINDOW / max(float(np.median(np.diff(t))), 1e-9)))
     reach = min(reach, (t.size - 1) // 2)
@@ -257,7 +256,7 @@ def _rotation(t: Array, q: Array, y: Array, velocity: Array) -> Places:
     usual = float(np.median(speed[speed > 0.0])) if np.any(speed > 0.0) else 0.0
     moving = (speed <= FASTEST) & (speed > 0.1 * min(usual, FASTEST))
     turns = np.flatnonzero(np.diff(np.sign(velocity)) != 0.0)
-    for k in range(-reach, reach + 2):  # where slopes are taken across a turn-round
+    for k in range(-reach, reach + 2):  # where slopes span a reversal
         moving[np.clip(turns + k, 0, t.size - 1)] = False
     if not np.any(moving):
         none = np.zeros(0)
@@ -289,7 +288,7 @@ def _rotation(t: Array, q: Array, y: Array, velocity: Array) -> Places:
 
 
 def _swing(t: Array, q: Array, velocity: Array) -> Array:
-    """Velocity and acceleration from polynomials over `WINDOW` on each side, flat up to high orders, shape (n, 2)."""
+    """Return velocity and acceleration by polynomials over `WINDOW` on each side, flat to high orders, shape (n, 2)."""
     step = float(np.median(np.diff(t)))
     reach = max(3, round(WINDOW / max(step, 1e-9)))
     out = np.column_stack([velocity, np.zeros(t.size)])
@@ -304,14 +303,14 @@ def _swing(t: Array, q: Array, velocity: Array) -> Array:
     rate = rate / pace
     out[inner] = np.column_stack([rate, (curve - rate * uneven) / pace**2])
     gaps = np.flatnonzero(np.diff(t) > GAP * step)
-    for k in range(1 - reach, reach + 1):  # beside a gap a row has no neighbours
+    for k in range(1 - reach, reach + 1):  # next to a gap a row has no neighbours
         rows = np.clip(gaps + k, 0, t.size - 1)
         out[rows] = np.column_stack([velocity[rows], np.zeros(rows.size)])
     return out
 
 
 def _smooth(x: Array, reach: int) -> Array:
-    """Mean over so many neighbours on both sides, as many as there are."""
+    """Return the mean over `reach` neighbours on both sides, as far as they exist."""
     total = np.concatenate([[0.0], np.cumsum(x)])
     low = np.maximum(np.arange(x.size) - reach, 0)
     high = np.minimum(np.arange(x.size) + reach + 1, x.size)

@@ -1,4 +1,4 @@
-"""A table over the angle, in place of harmonics: means of cells, linear between them."""
+"""A table over the angle instead of harmonics: means of cells, linear between them."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from stickslip.identification.cogging.rows import Places
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 FINEST = 2048
-"""Cells of a turn."""
+"""Most cells per turn."""
 
 
 def table_of(places: Places) -> tuple[Array, Array]:
-    """Even and odd part at ``2 pi i / n``, shape (n,) each; what lies between measured cells is linear."""
+    """Return the even and odd part at ``2 pi i / n``, shape (n,) each; gaps between measured cells are linear."""
     cells = int(min(FINEST, max(8, round(2.0 * math.pi / (2.0 * places.spacing)))))
     sides = [_side(places.at(places.direction == d), cells) for d in (1.0, -1.0)]
     return 0.5 * (sides[0] + sides[1]), 0.5 * (sides[0] - sides[1])
 
 
 def _side(places: Places, cells: int) -> Array:
-    """Means of one direction at the cells, shape (cells,)."""
+    """Return the means of one direction at the cells, shape (cells,)."""
     turn = 2.0 * math.pi
     angle = np.mod(places.angle, turn)
     cell = np.round(angle * cells / turn).astype(np.intp) % cells
@@ -38,7 +38,7 @@ def _side(places: Places, cells: int) -> Array:
 
 
 def table_left_out(places: Places, fold: Fold) -> float:
-    """RMS on what was left out."""
+    """Return the RMS on places left out."""
     number, total = fold(places), 0.0
     for f in range(int(number.max()) + 1):
         out = places.at(number == f)

@@ -1,4 +1,4 @@
-"""Has the friction changed? Two identified models compared, with what each leaves open."""
+"""Comparison of two identified models, with their uncertainty: has the friction changed?"""
 
 from __future__ import annotations
 
@@ -32,33 +32,32 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 DRAWS = 400
 RARE = 0.005
-"""Part of the draws beyond either end of what holds nearly all at a velocity: far fewer than the test may err in."""
+"""Part of the draws outside the limits at a velocity, on either side: far less than the level of the test."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """The result; printed, it is what `stickslip compare` prints.
+    """The result of a comparison; its text is the output of `stickslip compare`.
 
     Attributes
     ----------
     changes : tuple of Change
-        Parameters that both models identified; of different laws inertia, offset and the like alone.
+        Parameters that both models identified; for different laws only inertia, offset and the like.
     p : float
-        Of the joint test on those of the law (chi-square); not a number where the law has some that are not identified.
+        p-value of the joint test on the law's parameters (chi-square); NaN if the law has some that are not identified.
     velocity, difference, band : array, shape (n,)
-        Second curve minus first, and the half-width that holds 95 % of the whole curves.
+        Second curve minus first, and the half-width that contains 95 % of the whole curves.
     curve_p : float
-        Chance that curves of the same friction differ as much somewhere, at most: from `DRAWS` drawn, of which one more
-        counts than does.
+        Greatest probability that curves of the same friction differ as much somewhere: from `DRAWS` draws, plus one.
     changed : bool
-        The joint test, the curves or a single parameter say so; the curves alone where a parameter of the law is not
-        identified.
+        Whether the joint test, the curves or a single parameter show a change; only the curves, if a parameter of the
+        law is not identified.
     notes : tuple of str
     picture : Picture
     levels : tuple of Change
-        Torques at break-away and at speeds that both records have, whatever the laws are.
+        Torques at break-away and at speeds that both records contain, whatever the laws.
     summary : str
-        The verdict, by how much, and of what nothing is said.
+        The verdict, the size of the change, and the parameters it does not cover.
     """
 
     changes: tuple[Change, ...]
@@ -75,7 +74,7 @@ class Comparison:
 
     @property
     def largest(self) -> float:
-        """The greatest difference of the curves over its band; above 1 the curve has changed."""
+        """The greatest difference of the curves relative to its band; above 1 the curve has changed."""
         return float(np.max(np.abs(self.difference) / self.band))
 
     def __str__(self) -> str:
@@ -88,7 +87,7 @@ class Comparison:
         return f"<pre>{escape(str(self))}</pre>"
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {
             "changed": self.changed, "p": self.p, "curve_difference_over_band": self.largest, "curve_p": self.curve_p,
             "summary": self.summary,
@@ -101,7 +100,7 @@ class Comparison:
 
 
 def _row(c: Change) -> dict[str, Any]:
-    """Plain data."""
+    """Return plain data."""
     return {**asdict(c), "percent": c.percent, "percent_span": list(c.percent_span), "changed": c.changed}
 
 
@@ -113,13 +112,13 @@ def compare_models(
     Parameters
     ----------
     first, second : Identified
-        Curves, levels, inertia and offset are compared whatever the laws are; parameters of the law only of one law. Of
-        two sides of a gear, the second is brought to the first one's.
+        Curves, levels, inertia and offset are compared whatever the laws; parameters of the law only for the same law.
+        Between two sides of a gear, the second is converted to the first one's.
     top : float, optional
-        Highest velocity of the curves, rad/s; otherwise the highest that both records have or, where a file does not
-        say, 30 times the law's own velocity, or 1 rad/s.
+        Highest velocity of the curves, rad/s; otherwise the highest that both records contain or, if a file does not
+        state it, 30 times the law's own velocity, or 1 rad/s.
     level : float
-        Of all tests together: the curves have half of it; the parameters the other half, all at once and one by one.
+        Level of all tests together: half for the curves, half for the parameters, jointly and individually.
 
     Returns
     -------
@@ -138,7 +137,7 @@ def compare_models(
             )
     if first.motion != second.motion:
         raise InputError(f"{first.path} is a {first.motion} axis and {second.path} a {second.motion} one")
-    # Of a load that turns a part of the motor's turns, whole turns of either are not whole turns of the other.
+    # For a load behind a gear, whole turns of either shaft are not whole turns of the other.
     second, moved = on_one_side(first, second)
     second = without_angle(second) if moved else in_one_turn(first, second)
     changes, p, notes = compared_parameters(first, second)
@@ -154,7 +153,7 @@ def compare_models(
     own = {f.name for m in (first, second) for f in m.model.law.fields}
     single = min((c.p for c in changes if c.of(own) and not math.isnan(p + c.p)), default=1.0)
     changed = bool(np.any(np.abs(difference) > band)) or min(p, single) < 0.25 * level
-    # What the tests together do not bear out is not called changed one by one.
+    # A single change that the tests together do not confirm is not called a change.
     changes = tuple(replace(c, decides=changed) if c.of(own) else c for c in changes)
     levels = tuple(replace(c, decides=changed) for c in levels)
     summary = said_of(changes, levels, own, changed, untold(first, second))
@@ -166,7 +165,7 @@ def compare_models(
 
 
 def untold(first: Identified, second: Identified) -> tuple[str, ...]:
-    """Parameters of a law of both that are not identified in both; of different laws none is asked for."""
+    """Return the parameters of a common law that are not identified in both; none for different laws."""
     if first.model.law.name != second.model.law.name:
         return ()
     missing = {e.name: None for m in (first, second) for e in m.law_estimates[0] if not e.identified}
@@ -174,7 +173,7 @@ def untold(first: Identified, second: Identified) -> tuple[str, ...]:
 
 
 def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Change, ...], float, list[str]]:
-    """Each difference with its interval and chance, and the joint chance."""
+    """Return each difference with its interval and p-value, and the joint p-value."""
     special: Any = importlib.import_module("scipy.special")
     laws = first.model.law.name, second.model.law.name
     own = {f.name for m in (first, second) for f in m.model.law.fields}
@@ -204,7 +203,7 @@ def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Ch
     std = np.sqrt(np.diag(total))
     chance = np.array([math.erfc(abs(s) / d / math.sqrt(2.0)) for s, d in zip(step, std, strict=True)])
     chance = holm(chance)
-    # Inertia and offset are no friction: their change is told beside it.
+    # Inertia and offset are not friction: their change is reported separately.
     rows = [i for i, n in enumerate(names) if n.partition("[")[0] in own]
     joint = math.nan
     if rows and not words:
@@ -219,8 +218,8 @@ def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Ch
         changes.append(Change(x.name, x.unit, x.value, y.value, low, high, float(p)))
     left = sorted({e.name for e in (*first.estimates, *second.estimates)} - set(names))
     notes = [f"Not compared, since not identified in both: {', '.join(left)}."] if left else []
-    # What is not identified may trade places with what is, whose interval then leans on it: a joint test would take
-    # two equally good descriptions of one friction for a change.
+    # Parameters that are not identified may compensate those that are, whose intervals then depend on them: a joint
+    # test would take two equally good descriptions of one friction for a change.
     if untold(first, second):
         notes.append(
             "As parameters of the law are not identified, the curves alone decide: others may have changed in exchange."
@@ -230,13 +229,13 @@ def compared_parameters(first: Identified, second: Identified) -> tuple[tuple[Ch
 
 
 def chosen(model: Identified, names: Sequence[str]) -> tuple[tuple[Estimate, ...], Array]:
-    """Some estimates and their correlation."""
+    """Return some estimates and their correlation."""
     places = [next(i for i, e in enumerate(model.estimates) if e.name == n) for n in names]
     return tuple(model.estimates[i] for i in places), model.correlation[np.ix_(places, places)]
 
 
 def holm(p: Array) -> Array:
-    """Chances corrected for the number of tests (Holm 1979)."""
+    """Correct p-values for the number of tests (Holm 1979)."""
     order = np.argsort(p)
     factors = np.arange(p.size, 0, -1)
     out = np.empty(p.size)
@@ -245,7 +244,7 @@ def holm(p: Array) -> Array:
 
 
 def grid_of(first: Identified, second: Identified, top: float | None) -> tuple[Array, float, str]:
-    """Velocities of both directions, the least of them, and what is said of them."""
+    """Return the velocities in both directions, the least of them, and a note on them."""
     unit, common = first.unit("rad/s"), common_speeds(first, second)
     if top is not None and not (math.isfinite(top) and top > 0.0):
         raise InputError(f"the highest velocity {top:g} must be greater than 0")
@@ -269,11 +268,10 @@ def grid_of(first: Identified, second: Identified, top: float | None) -> tuple[A
 def compared_curves(
     first: Identified, second: Identified, velocity: Array, inside: float
 ) -> tuple[Array, Array, float, list[tuple[Array, Array]]]:  # fmt: skip
-    """Difference of the curves, the half-width towards no difference that holds that part of whole curves, the chance
-    of such a difference, and each curve's own draws.
+    """Return the difference of the curves, its half-width towards 0, its p-value, and each curve's own draws.
 
-    The half-width is a multiple of what holds nearly all draws at a velocity, the same multiple at all of them, so that
-    it holds for the curve as a whole.
+    The half-width contains a part `inside` of whole curves: it is the same multiple, at all velocities, of the limits
+    that contain nearly all draws at one velocity.
     """
     sides: list[tuple[Array, Array]] = []
     for seed, model in enumerate((first, second)):
@@ -285,8 +283,8 @@ def compared_curves(
             "the laws refuse nearly all parameters inside the intervals; identify them from more data"
         )
     rest = (sides[1][1][:count] - sides[1][0]) - (sides[0][1][:count] - sides[0][0])
-    # No standard deviations: what a parameter that is not identified does in a few draws at one speed would widen the
-    # band at all speeds.
+    # Not standard deviations: the effect of an unidentified parameter in a few draws at one speed would widen the band
+    # at all speeds.
     ends: Array = np.quantile(rest, [RARE, 1.0 - RARE], axis=0)
     least = 1e-12 * float(np.max(np.abs(sides[0][0])))
     below: Array = np.maximum(-ends[0], least)
@@ -303,7 +301,7 @@ def picture_of(
     model: Identified, velocity: Array, sides: Sequence[tuple[Array, Array]], message: str,
     both: tuple[Identified, Identified],
 ) -> Picture:  # fmt: skip
-    """Both curves with their bands and the recorded speeds, motion in the positive direction."""
+    """Return both curves with their bands and the recorded speeds, in the positive direction."""
     rows = velocity > 0.0
     names = [m.path.name for m in both]
     labels = names if names[0] != names[1] else [str(m.path) for m in both]

@@ -1,7 +1,7 @@
-"""By how much two identified models differ: one number with its interval, whatever their laws are.
+"""Size of the difference between two identified models, with its interval, whatever their laws.
 
-Parameters of different laws have no common meaning; the torque that it takes to move at a speed has. Levels are torques
-at speeds that both records have, and at break-away where both models identified it.
+Parameters of different laws have no common meaning; the torque at a speed has. Levels are torques at speeds that both
+records contain, and at break-away if both models identified it.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ DRAWS = 400
 
 @dataclass(frozen=True)
 class Change:
-    """One number in both models; ``p`` is the chance of such a difference without a change, after Holm; not a number
-    of a torque, whose interval tells.
+    """One number in both models, with its change.
 
-    Of friction it decides (``decides``) only where the tests of all of it together say that friction has changed.
-    ``lower`` and ``upper`` bound second less first, 95 %.
+    ``p`` is the probability of such a difference without a change, after Holm; NaN for a torque, whose interval
+    decides. A number of friction decides (``decides``) only if the joint tests show that friction has changed.
+    ``lower`` and ``upper`` are the 95 % bounds of second minus first.
     """
 
     name: str
@@ -44,25 +44,28 @@ class Change:
 
     @property
     def changed(self) -> bool:
-        """At the 5 % level of all parameters together; of a torque, whether its interval leaves 0 out."""
+        """Whether it changed, at the 5 % level of all parameters; for a torque, whether its interval excludes 0."""
         return self.decides and self.differs
 
     @property
     def differs(self) -> bool:
-        """The same, whatever the other tests say."""
+        """Whether it differs, whatever the other tests show."""
         return self.told if math.isnan(self.p) else self.p < 0.05
 
     @property
     def percent(self) -> float:
-        """Change in per cent of the first value; not a number where that is 0 or less than the interval of the change
-        is wide to one side, as an offset near 0, or the two differ in sign, or it is an angle."""
+        """Change in per cent of the first value; NaN if that is not meaningful.
+
+        That is the case for a value near 0 relative to the interval of the change (such as an offset), for opposite
+        signs, and for an angle.
+        """
         near_zero = abs(self.first) <= 0.5 * (self.upper - self.lower)
         told = self.first * self.second > 0.0 and not near_zero and self.name != ANGLE
         return 100.0 * (self.second / self.first - 1.0) if told else math.nan
 
     @property
     def percent_span(self) -> tuple[float, float]:
-        """The 95 % interval of the change, per cent of the first value; as `percent` not a number."""
+        """The 95 % interval of the change, per cent of the first value; NaN where `percent` is."""
         if math.isnan(self.percent):
             return math.nan, math.nan
         low, high = sorted((100.0 * self.lower / self.first, 100.0 * self.upper / self.first))
@@ -70,15 +73,15 @@ class Change:
 
     @property
     def told(self) -> bool:
-        """Whether its own interval leaves 0 out."""
+        """Whether its own interval excludes 0."""
         return self.lower > 0.0 or self.upper < 0.0
 
     def of(self, law: Collection[str]) -> bool:
-        """Whether it is one of these parameters, or an element of one."""
+        """Return whether it is one of these parameters, or an element of one."""
         return self.name.partition("[")[0] in law
 
     def words(self) -> str:
-        """Name, change and interval: in per cent, or in its unit where that has no meaning."""
+        """Return name, change and interval as text: in per cent, or in its unit if that is not meaningful."""
         if math.isnan(self.percent):
             by = self.second - self.first
             return f"{self.name} {by:+.3g} {self.unit} [{self.lower:+.3g}, {self.upper:+.3g}]"
@@ -87,12 +90,12 @@ class Change:
 
 
 def rounded(percent: float) -> str:
-    """With its sign; whole numbers from 10 on, below one digit more."""
+    """Return a signed percentage: a whole number from 10 on, two digits below."""
     return f"{percent:+.0f}" if abs(percent) >= 9.95 else f"{percent:+.2g}"
 
 
 def common_speeds(first: Identified, second: Identified) -> tuple[float, float] | None:
-    """Least and greatest speed that both records have, in either direction, rad/s; None where a file does not say."""
+    """Return the least and greatest speed in both records, either direction, rad/s; None if a file lacks them."""
     if not (first.speeds and second.speeds):
         return None
     ends = [
@@ -104,8 +107,11 @@ def common_speeds(first: Identified, second: Identified) -> tuple[float, float] 
 
 
 def believed(model: Identified) -> tuple[tuple[Estimate, ...], Array]:
-    """The law's estimates and their correlation; an interval that was refused although narrow is `RATIO` times wider to
-    each side: what speaks against the estimate is not in it."""
+    """Return the law's estimates and their correlation.
+
+    A narrow interval of an estimate that was not identified is widened by `RATIO` to each side, since it does not
+    include the reason for that verdict.
+    """
     estimates, correlation = model.law_estimates
     return tuple(
         replace(e, lower=e.lower / RATIO, upper=e.upper * RATIO)
@@ -114,7 +120,7 @@ def believed(model: Identified) -> tuple[tuple[Estimate, ...], Array]:
 
 
 def levels_of(first: Identified, second: Identified, low: float, high: float) -> tuple[Change, ...]:
-    """Break-away, and the torque at three speeds from `low` to `high`, rad/s; both ways where a law has two sides."""
+    """Compare break-away and the torque at three speeds from `low` to `high`, rad/s, in each direction of a law."""
     speeds = [low, math.sqrt(low * high), high]
     two = any(m.model.law.chosen.get("symmetry") == "asymmetric" for m in (first, second))
     points = [*speeds, *(-v for v in speeds)] if two else speeds
@@ -141,7 +147,7 @@ def levels_of(first: Identified, second: Identified, low: float, high: float) ->
 def said_of(
     changes: Sequence[Change], levels: Sequence[Change], own: Collection[str], changed: bool, untold: Sequence[str]
 ) -> str:  # fmt: skip
-    """The verdict, by how much: of the friction, of what is beside it, and of what `untold` is not identified."""
+    """Return the verdict as text: changes of friction, of other parameters, and the parameters in `untold`."""
     beside = [c.words() for c in changes if c.changed and not c.of(own)]
     friction = ", ".join(c.words() for c in (*(c for c in changes if c.of(own)), *levels) if c.differs)
     names = ", ".join(untold)
@@ -159,7 +165,7 @@ def said_of(
 
 
 def unseen(changes: Sequence[Change], levels: Sequence[Change]) -> tuple[str, ...]:
-    """What could not have been seen: for each number that did not change, how large a change goes unseen."""
+    """Report, for each number without a change, the smallest change that would have been detected."""
     parts: list[str] = []
     for c in (*changes, *levels):
         if c.differs or c.told:

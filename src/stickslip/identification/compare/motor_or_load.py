@@ -1,4 +1,4 @@
-"""An identified model brought to the other side of the gear: the same axis in the motor's or the load's numbers."""
+"""Conversion of an identified model to the other side of the gear: the same axis seen from the motor or the load."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from stickslip.models.model import Model
 
 
 def on_one_side(first: Identified, second: Identified) -> tuple[Identified, str]:
-    """The second on the first one's side of the gear, and a note where that made a difference.
+    """Return the second model on the first one's side of the gear, and a note if that changes it.
 
     Raises
     ------
     InputError
-        If they are about different sides and neither file knows the gear ratio, or they know different ones, or a
-        parameter of the law has a unit that does not show how it transforms through a gear.
+        If they are on different sides and neither file states the gear ratio, or the ratios differ, or the unit of a
+        law's parameter does not show how it transforms through a gear.
     """
     sides = [str(m.axis.get("seen_from", "load")) for m in (first, second)]
     ratios = [float(m.axis.get("gear_ratio", 1.0) or 1.0) for m in (first, second)]
@@ -42,7 +42,7 @@ def on_one_side(first: Identified, second: Identified) -> tuple[Identified, str]
 
 
 def through_gear(found: Identified, n: float) -> Identified:
-    """The model at a shaft that turns `n` times as fast: torques are divided by n."""
+    """Return the model at a shaft that turns `n` times as fast: torques are divided by n."""
     units = {f.name: f.par.unit for f in found.model.law.fields}
     values: dict[str, Any] = {}
     parameters: dict[str, Any] = found.model.parameters._asdict()
@@ -65,7 +65,7 @@ def through_gear(found: Identified, n: float) -> Identified:
 
 
 def _factor(unit: str, n: float, what: str) -> float:
-    """What a quantity of this unit is multiplied by at a shaft that turns n times as fast."""
+    """Return the factor of a quantity with this unit at a shaft that turns n times as fast."""
     if unit in ("", "-", "s", "1/s"):
         return 1.0
     if unit == "kg·m²":
@@ -81,5 +81,5 @@ def _factor(unit: str, n: float, what: str) -> float:
 
 
 def _angles(text: str) -> int:
-    """The power of rad."""
+    """Return the power of rad."""
     return sum(2 if square else 1 for square in re.findall(r"rad(²?)", text))

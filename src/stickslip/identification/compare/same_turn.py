@@ -1,4 +1,4 @@
-"""The angle at which a pendulum hangs, known but for whole turns, in two models: told in one turn."""
+"""The angle at which a pendulum hangs, determined up to whole turns, shifted to a common turn in two models."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from stickslip.identification.identified_file import Identified
 
 ANGLE = "gravity_angle"
-"""rad. It has no zero of its own: neither per cent nor logarithms mean anything."""
+"""Name of the angle, rad. It has no natural zero, so percentages and logarithms of it are meaningless."""
 
 
 def in_one_turn(first: Identified, second: Identified) -> Identified:
-    """The second, its angle turned by whole turns to within half a turn of the first one's."""
+    """Return the second model with its angle shifted by whole turns to within half a turn of the first one's."""
     angles = [e.value for m in (first, second) for e in m.estimates if e.name == ANGLE]
     if len(angles) < 2 or not all(map(math.isfinite, angles)):
         return second
@@ -27,7 +27,7 @@ def in_one_turn(first: Identified, second: Identified) -> Identified:
 
 
 def without_angle(found: Identified) -> Identified:
-    """The model without that angle: brought through a gear, it has whole turns of another shaft."""
+    """Return the model without that angle: after conversion through a gear, it has whole turns of another shaft."""
     kept = [k for k, e in enumerate(found.estimates) if e.name != ANGLE]
     correlation = found.correlation[np.ix_(kept, kept)]
     return replace(found, estimates=tuple(found.estimates[k] for k in kept), correlation=correlation)

@@ -1,4 +1,4 @@
-"""A comparison as text: the tables of changes, what both tests say, the notes and the verdict."""
+"""A comparison as text: tables of changes, results of both tests, notes and verdict."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 HEAD = ("first", "second", "unit", "change, 95 % interval")
 USUAL = (26, 11, 11, 12, 34)
 LEAST = 1e-6
-"""A chance below it depends on how normal the estimates are, far out."""
+"""Least p-value that is printed: a smaller one depends on how normal the estimates are in their tails."""
 
 
 def lines(result: Comparison) -> Iterator[str]:
-    """What `stickslip compare` prints."""
+    """Yield the lines that `stickslip compare` prints."""
     widths = widths_of([*result.changes, *result.levels])
     if result.changes:
         yield f"{row(('parameter', *HEAD), widths)} p (Holm)"
@@ -40,12 +40,12 @@ def lines(result: Comparison) -> Iterator[str]:
 
 
 def cells(c: Change) -> tuple[str, ...]:
-    """Name, both values, unit, and the change in per cent or, where that has no meaning, in the unit."""
+    """Return name, both values, unit, and the change in per cent or, if that is not meaningful, in the unit."""
     return c.name, f"{c.first:.5g}", f"{c.second:.5g}", c.unit, c.words()[len(c.name) + 1 :]
 
 
 def widths_of(changes: Sequence[Change]) -> tuple[int, ...]:
-    """Of all columns: as usual, or wider, so that none touches the next."""
+    """Return the widths of all columns: the usual ones, or wider to keep columns apart."""
     return tuple(
         max([usual, *(len(cell) + 1 for cell in column)])
         for usual, column in zip(USUAL, zip(*map(cells, changes), strict=True), strict=False)
@@ -53,7 +53,7 @@ def widths_of(changes: Sequence[Change]) -> tuple[int, ...]:
 
 
 def row(cells: Sequence[str], widths: Sequence[int]) -> str:
-    """A line of a table."""
+    """Return a line of a table."""
     name, first, second, unit, by = (
         f"{cell:{side}{width}}" for cell, side, width in zip(cells, "<>><<", widths, strict=True)
     )
@@ -61,12 +61,12 @@ def row(cells: Sequence[str], widths: Sequence[int]) -> str:
 
 
 def chance(p: float) -> str:
-    """A chance, or the bound below which its value tells nothing; "-" where there is none."""
+    """Return a p-value as text, or its bound below `LEAST`; "-" if there is none."""
     if math.isnan(p):
         return "-"
     return f"< {LEAST:g}" if p < LEAST else f"{p:.2g}"
 
 
 def equal_to(p: float) -> str:
-    """The same behind a letter."""
+    """Return a p-value as text with its relation."""
     return chance(p) if p < LEAST else f"= {chance(p)}"

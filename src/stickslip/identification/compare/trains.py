@@ -1,4 +1,4 @@
-"""Whether the spring between motor and load has changed, as of a belt that slackens, in a sentence."""
+"""A change of the spring between motor and load, such as a belt that slackens, in a sentence."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from stickslip.machines.two_inertias import TwoInertias
 
 
 def on_trains(first: Identified, second: Identified) -> list[str]:
-    """What both models say of a load behind a spring; nothing where neither tells one.
+    """Compare the loads behind a spring of both models; return nothing if neither has one.
 
-    The antiresonance goes with the square root of the spring's stiffness, whatever the motor is.
+    The antiresonance is proportional to the square root of the spring's stiffness, whatever the motor.
     """
     if first.train is None or second.train is None:
         return [
@@ -33,12 +33,12 @@ def on_trains(first: Identified, second: Identified) -> list[str]:
 
 
 def width_of(train: TwoInertias) -> float:
-    """Half-width of the frequency's interval, Hz."""
+    """Return the half-width of the frequency's interval, Hz."""
     low, high = train.antiresonance_interval
     return 0.5 * (high - low)
 
 
 def spoken(train: TwoInertias) -> str:
-    """The frequency with its interval."""
+    """Return the frequency with its interval as text."""
     low, high = train.antiresonance_interval
     return f"{train.antiresonance:.3g} Hz [{low:.3g}, {high:.3g}]"

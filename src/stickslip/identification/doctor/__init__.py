@@ -1,6 +1,6 @@
-"""The doctor: what is wrong with a record, before anything is identified from it.
+"""The doctor: checks for defects of a record before anything is identified from it.
 
-`CHECKS` names every check; each yields findings and changes nothing. To add one, write a function of a `View` in the
+`CHECKS` lists every check; each yields findings and changes nothing. To add one, write a function of a `View` in the
 file of its family and add it to the tuple.
 """
 
@@ -43,11 +43,11 @@ ERRORS = (
     "never-moved", "no-torque", "position-reference-unit", "position-unit", "position-wrap", "time-unit", "torque-sign",
     "torque-magnitude", "torque-unit", "unknown-unit", "velocity-mismatch", "velocity-sign", "velocity-unit",
 )  # fmt: skip
-"""Codes of what may make a record unusable, those of its reading among them."""
+"""Codes of errors that may make a record unusable, including those of its reading."""
 FIRST: tuple[Callable[[View], Iterator[Finding]], ...] = (
     excitation.channels, signals.missing, signals.too_small, timing.ascending, timing.sampling,
 )  # fmt: skip
-"""What may be asked of any record; the other checks need enough usable rows."""
+"""Checks that apply to any record; the others require enough usable rows."""
 CHECKS: tuple[Callable[[View], Iterator[Finding]], ...] = (
     *FIRST, timing.scale, velocity.velocity_late, units.assumed, units.counted,
     units.degrees, units.turns, units.reference_scale, velocity.velocity_scale, units.too_fast, units.torque_scale,
@@ -70,19 +70,19 @@ CONSEQUENCES = {
         "irregular-sampling", "gap", "spikes", "position-jump",
     ),
 }  # fmt: skip
-"""By an error, what comes of it: nobody knows of these before it is repaired, and their own remedies are wrong."""
+"""Consequences of an error: findings that are meaningless before it is repaired and whose own remedies are wrong."""
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What the doctor says of a record.
+    """The doctor's findings on a record.
 
     Attributes
     ----------
     findings : tuple of Finding
-        Errors first; those of the reading included.
+        Errors first; includes those of the reading.
     record : Record
-        The rows that can be used: times ascend, values are numbers. What was left out is among the findings.
+        The usable rows: times increase and values are finite. The findings list the rows left out.
     """
 
     findings: tuple[Finding, ...]
@@ -94,12 +94,12 @@ class Diagnosis:
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """What makes the record unusable."""
+        """Findings that make the record unusable."""
         return tuple(f for f in self.findings if f.level == "error")
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """What makes a result doubtful."""
+        """Findings that make a result doubtful."""
         return tuple(f for f in self.findings if f.level == "warning")
 
     def __str__(self) -> str:
@@ -107,7 +107,7 @@ class Diagnosis:
         return "\n".join([*lines, f"{len(self.errors)} errors, {len(self.warnings)} warnings"])
 
     def _repr_html_(self) -> str:
-        """A table in a notebook."""
+        """Return a table for a notebook."""
         rows = "".join(
             f"<tr><td>{f.level}</td><td>{escape(f.code)}</td><td>{escape(f.line())}</td></tr>"
             for f in self.findings
@@ -131,7 +131,7 @@ class Diagnosis:
 
 
 def of_arrays(record: Record) -> bool:
-    """Whether the signals were given as arrays by name: they have units and no columns."""
+    """Return whether the signals were given as arrays by name: they have units and no columns."""
     reading: dict[str, Any] = record.meta.get("reading", {})
     sources = {c["source"] for c in reading.get("columns", ())}
     return not reading.get("file") and sources == {"map"}
@@ -141,23 +141,23 @@ def examine(
     record: Record, *, stribeck_velocity: float | None = None, accept: Sequence[str] = (),
     estimate: EstimateSliding = estimate_sliding,
 ) -> Diagnosis:  # fmt: skip
-    """Check a record for everything that would spoil an identification.
+    """Check a record for defects that would spoil an identification.
 
     Parameters
     ----------
     record : Record
-        Measured or simulated; what was found while it was read (``meta["reading"]``) is taken over.
+        Measured or simulated; findings of its reading (``meta["reading"]``) are included.
     stribeck_velocity : float
-        rad/s (or m/s): whether the record has speeds near it. Without it, near a twentieth of the usual speed.
+        rad/s (or m/s), to check for speeds near it. Without it, near a twentieth of the usual speed.
     accept : sequence of str
-        Codes of errors that count as warnings, since the caller knows better; those of `FINAL` stay errors.
+        Codes of errors that the caller accepts as warnings; those of `FINAL` stay errors.
     estimate : callable
         `estimate_sliding`, or a memo of it that keeps the result for the identification.
 
     Raises
     ------
     UnknownName
-        If a code of `accept` is none of `ERRORS`.
+        If a code of `accept` is not in `ERRORS`.
     """
     for code in accept:
         if code not in ERRORS:
@@ -168,7 +168,7 @@ def examine(
     view = View(record, estimate)
     reading = cast("Mapping[str, Any]", record.meta.get("reading", {}))
     findings = [Finding.from_data(f) for f in reading.get("findings", [])]
-    # Absurd numbers overflow; whatever comes of them compares as false.
+    # Absurd numbers overflow; comparisons with the results are false.
     with np.errstate(all="ignore"):
         for check in FIRST:
             findings += check(view)
@@ -178,7 +178,7 @@ def examine(
         if enough and not any(f.code == "never-moved" for f in findings):
             findings += excitation.reversed_and_slow(view, stribeck_velocity)
         else:
-            # Noise has no sign, no delay and no speed.
+            # Noise has no sign, delay or speed.
             vain = (
                 "torque-sign",
                 "time-skew",
@@ -198,7 +198,7 @@ def examine(
 
 
 def accepted(findings: Sequence[Finding], accept: Sequence[str]) -> list[Finding]:
-    """Return the findings, errors that the caller accepts as warnings."""
+    """Return the findings with accepted errors as warnings."""
     return [
         replace(f, level="warning") if f.level == "error" and f.code in accept and f.code not in FINAL else f
         for f in findings
@@ -206,7 +206,7 @@ def accepted(findings: Sequence[Finding], accept: Sequence[str]) -> list[Finding
 
 
 def _usable_rows(view: View) -> tuple[Record, list[Finding]]:
-    """The record without the rows that cannot be used, and the finding that lists them."""
+    """Return the record without unusable rows, and the finding that lists them."""
     record, keep = view.record, view.usable
     if view.has("event"):
         keep = keep | (record["event"] > 0.5)

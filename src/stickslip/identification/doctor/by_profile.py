@@ -1,6 +1,6 @@
-"""What doubts a unit or a sign that a profile says: that it is the profile's, and how to read a file without it.
+"""Findings that question a unit or sign from a profile: they name the profile and how to read a file without it.
 
-A profile holds for files with the same names of columns; those of another drive may have the names and other units.
+A profile applies to files with the same column names; another drive may use these names with other units.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ CONCERNS = {
     "reference-scale": ("position_reference", "position"), "torque-sign": (*DRIVEN, "position", "velocity"),
     "torque-unit": DRIVEN, "torque-magnitude": DRIVEN,
 }  # fmt: skip
-"""Channels whose units a finding doubts, by its code."""
+"""Channels whose units a finding questions, by its code."""
 
 
 def told(findings: Sequence[Finding], view: View) -> list[Finding]:
-    """The findings; those that doubt what a profile says have it in their words."""
+    """Return the findings; those that question a profile's unit name the profile."""
     return [_told(finding, view) for finding in findings]
 
 
 def _told(finding: Finding, view: View) -> Finding:
-    # A current that makes the torque is doubted with it, one beside it is not.
+    # A current from which the torque is computed is questioned with it, a separate one is not.
     beside = {"current"} if "motor_torque" in view.columns else set[str]()
     by = [c for c in CONCERNS.get(finding.code, ()) if c not in beside and c in view.columns]
     by = [c for c in by if view.columns[c].by_profile]
@@ -44,7 +44,7 @@ def _told(finding: Finding, view: View) -> Finding:
     remedy = f"{finding.remedy}, or {without} to leave that out{also}"
     turned = [c for c in by if view.columns[c].unit.startswith("-")]
     if turned and finding.code.endswith("-sign"):
-        # What was said for another file is doubted before this one.
+        # A sign set for another file is questioned first.
         profile = f"the profile {_reading(view)['saved_profile']}" if saved else "the profile"
         undo = "delete that file" if saved else "correct it there"
         whether = "if this log's own sign is right"

@@ -1,10 +1,10 @@
-"""One record, one machine: friction, inertia, load or temperature that change within the record.
+"""Changes within one record: friction, inertia, load or temperature.
 
-A curve of friction over the velocity, an inertia and a torque over the position are fitted to the whole filtered
-record (whatever the law of friction). In blocks of equal motion the torque is then regressed on the inertia's part, the
-curve and a constant: how many times as large is each here? A step or a trend from block to block counts as a change
-where it stands out of the scatter of the blocks themselves, which holds coloured noise, cogging, sticking and what
-else the fit does not know (a random-effects comparison: DerSimonian and Laird 1986).
+A friction curve over velocity, an inertia and a torque over position are fitted to the whole filtered record (whatever
+the law of friction). In blocks of equal length the torque is then regressed on the inertia's part, the curve and a
+constant, which gives the size of each relative to the whole record. A step or a trend over the blocks counts as a
+change if it exceeds the scatter between the blocks, which includes coloured noise, cogging, sticking and other
+unmodelled effects (a random-effects comparison: DerSimonian and Laird 1986).
 """
 
 from __future__ import annotations
@@ -25,41 +25,43 @@ from stickslip.identification.notes import drift_of
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 
 DRIFTS_BY = 0.05
-"""Of friction at the first row, that a drift is worth a warning from."""
+"""Drift from which on a warning is given, part of friction at the first row."""
 MOST_ROWS = 30_000
 BLOCKS, FEWEST_BLOCKS = 16, 8
 PER_BLOCK = 150
-"""Moving rows of the filtered record that a block needs: a dozen independent ones."""
+"""Fewest moving rows of the filtered record in a block: a dozen independent ones."""
 SETTLED = 15
 KNOTS, HARMONICS, PLACES = 6, 6, 8
-"""Of the friction curve in each direction; of the torque over a turn; over a way of less than a turn."""
+"""Knots of the friction curve in each direction; harmonics of the torque over a turn; knots over less than a turn."""
 SURE, SURE_OF_FEW = 5.0, 30.0
-"""A change counts from SURE + SURE_OF_FEW / degrees of freedom standard deviations on: 7 at 16 blocks. Of 16 blocks in
-which nothing changes, the largest of all splits, trends and parameters passes 5 in one record of a hundred."""
+"""A change counts from SURE + SURE_OF_FEW / degrees of freedom standard deviations on, 7 with 16 blocks: the maximum
+over all splits, trends and parameters is compared, and few blocks have heavier tails."""
 WORTH = {"inertia": 0.1, "friction": 0.1, "load": 0.15}
-"""Parts of itself (of the friction) that a change must have to spoil a result."""
+"""Least change that would spoil a result, as a part of the parameter itself (for a load: of friction)."""
 SHARE = 0.04
-"""Of the torque that a change must be: edges of a staircase that the filter blurs pass for an inertia of less."""
+"""Least change as a part of the torque: blurred edges of a staircase resemble a smaller inertia."""
 OWN = 0.1
-"""Part of the acceleration that is no function of the position, below which no inertia is told (a single sine)."""
+"""Least part of the acceleration that is independent of the position; below it (a single sine) the inertia is
+undetermined."""
 THIRD, OTHER_MOTION = 1.0 / 3.0, 3.0
-"""Of a trend, which is an end of it; times the acceleration, or that over the velocity, at one end that it is at the
-other in another motion: of 24 sweeps of another program's logs 3 were called changes, with it 2, whose rate rises by 2
-to 2.8."""
+"""Part of a trend that counts as its start or end; ratio between both ends of the acceleration, or of acceleration to
+velocity, from which on the motion itself differs."""
 WARMER = 5.0
-"""K."""
+"""Temperature change that gives a warning, K."""
 UNTOLD, WORSE = 1.0, 4.0
-"""What is left of a block's torque, over the part that something makes of it by itself, from which on the block does
-not tell that thing; and times the lower quartile of the blocks. Where an axis creeps after it accelerated, cogging and
-blurred edges pass for an inertia: false changes in 3 logs of 187 and 8 of 240 without these, in none with them."""
+"""Greatest residual of a block's torque relative to a parameter's independent part of it, for the block to determine
+the parameter; and greatest ratio of it to the lower quartile of the blocks. If an axis creeps after it accelerated,
+cogging and blurred edges otherwise resemble an inertia."""
 BOTH = 0.05
-"""Share of the moving rows in either direction that tells friction from a load."""
+"""Least share of the moving rows in either direction for friction and load to be distinguished."""
 
 
 @dataclass(frozen=True, slots=True)
 class Blocks:
-    """Each block's parts: estimates (b, 3) of inertia, friction, load against the whole record's, their variances,
-    whether the block tells them."""
+    """Estimates of inertia, friction and load in each block relative to the whole record, shape (b, 3).
+
+    `variances` are theirs; `told` is whether the block determines them.
+    """
 
     values: Array
     variances: Array
@@ -69,8 +71,10 @@ class Blocks:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """Which part changes, how sure that is, the last block before the step and the first behind it, and whether it is
-    a trend instead."""
+    """The parameter that changes, its significance, and where.
+
+    `before` and `split` are the last block before the step and the first after it; `gradual` means a trend.
+    """
 
     part: str
     sure: float
@@ -80,14 +84,14 @@ class Change:
 
 
 def changes(view: View) -> Iterator[Finding]:
-    """Friction, inertia or load of another size in one part of the record than in the other; or a drift."""
+    """Yield a warning if friction, inertia or load changes within the record, or friction drifts."""
     found = list(_between_blocks(view))
     yield from found or _drifting(view)
 
 
 def _drifting(view: View) -> Iterator[Finding]:
-    """Friction that drifts with time, as gross sliding shows it, by more than a few percent."""
-    found = None if view.smooth is None else view.sliding  # times that are none make neither
+    """Yield a warning if friction in gross sliding drifts with time by more than a few percent."""
+    found = None if view.smooth is None else view.sliding  # Without usable times neither exists.
     drift = None if found is None else drift_of(found)
     if drift is None or abs(drift.share) < DRIFTS_BY:
         return
@@ -100,7 +104,7 @@ def _drifting(view: View) -> Iterator[Finding]:
 
 
 def _between_blocks(view: View) -> Iterator[Finding]:
-    """What is of another size in some blocks than in the others."""
+    """Yield a warning if a parameter differs between blocks."""
     smooth = view.smooth
     if smooth is None or view.torque_channel != "motor_torque" or smooth.fast <= 0.0:
         return
@@ -115,7 +119,7 @@ def _between_blocks(view: View) -> Iterator[Finding]:
         return
     blocks = _blocks(parts, torque, count)
     size = np.sqrt(np.mean(parts**2, axis=0))
-    size[2] = size[1]  # the load's unit is the friction
+    size[2] = size[1]  # The load is in units of friction.
     weight = size / float(np.std(torque))
     found = [c for part in range(3) if (c := _change(blocks, part, float(weight[part]))) is not None]
     if not found:
@@ -129,7 +133,7 @@ def _between_blocks(view: View) -> Iterator[Finding]:
     sizes = system.changes(torque, parts, shape)
     if other_motion(smooth.acceleration[rows], smooth.velocity[rows], shape):
         return
-    # All rows together must say what the blocks say.
+    # The fit to all rows must agree with the blocks.
     small = {n for n, s in zip(WORTH, sizes, strict=True) if n != "load" and abs(s) < WORTH[n]}
     told, alone = {c.part for c in found} - small, system.own_acceleration() > OWN
     if not told:
@@ -152,9 +156,9 @@ def _between_blocks(view: View) -> Iterator[Finding]:
 
 
 def other_motion(acceleration: Array, velocity: Array, shape: Array) -> bool:
-    """Whether the motion is another where the shape ends than where it begins: slower, or of other frequencies.
+    """Return whether the motion at the end of the shape differs from that at its start: slower, or other frequencies.
 
-    What friction and inertia are not, springs and bristles among it, then looks like a change of them.
+    Effects other than friction and inertia, springs and bristles among them, then look like a change of these.
     """
     ends = [shape < THIRD, shape > 1.0 - THIRD]
     pulls, speeds = ([float(np.sqrt(np.mean(x[end] ** 2))) for end in ends] for x in (acceleration, velocity))
@@ -171,7 +175,7 @@ def _words(name: str, size: float, view: View, alone: bool) -> str:
 
 
 def temperature(view: View) -> Iterator[Finding]:
-    """A machine that warms up or cools down by more than friction stands."""
+    """Yield a warning if the temperature changes enough to change friction."""
     if not view.has("temperature"):
         return
     values = view.values("temperature")
@@ -190,7 +194,7 @@ def temperature(view: View) -> Iterator[Finding]:
 
 
 def _rows(smooth: Smooth) -> Rows:
-    """Rows of steady direction: the filter mixes what lies within `SETTLED` rows of a stop or a reversal."""
+    """Return rows of steady direction: the filter mixes rows within `SETTLED` rows of a stop or a reversal."""
     still = (~smooth.moving).astype(int)
     still[1:] |= np.diff(np.sign(smooth.velocity)) != 0.0
     still[:60] = still[-60:] = 1
@@ -201,15 +205,17 @@ def _rows(smooth: Smooth) -> Rows:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Columns of the whole record's regression: acceleration, friction's curve, place."""
+    """Columns of the whole record's regression: acceleration, friction curve, position."""
 
     velocity: Array
     matrix: Array
     curve: slice
 
     def parts(self, torque: Array) -> Array | None:
-        """The parts of the torque that the fit gives: inertia's, friction's, all else (n, 3); None where it fits badly,
-        or an axis that moves one way leaves friction and load one."""
+        """Return the fitted parts of the torque: inertia's, friction's, all else, shape (n, 3).
+
+        None if the fit is bad, or if an axis moves in one direction only and friction and load are one constant.
+        """
         if not BOTH < float(np.mean(self.velocity > 0.0)) < 1.0 - BOTH:
             return None
         values = _least(self.matrix, torque)
@@ -221,7 +227,7 @@ class System:
         return np.column_stack([inertia, friction, whole - inertia - friction])
 
     def changes(self, torque: Array, parts: Array, shape: Array) -> Array:
-        """By what part of themselves inertia and friction change along with a shape, and the load in its unit, (3,)."""
+        """Return the relative change of inertia and friction along a shape, and the load's in its unit, shape (3,)."""
         more = np.column_stack([shape * parts[:, 0], shape * parts[:, 1], shape])
         values = _least(np.column_stack([self.matrix, more]), torque)
         inertia, friction, load = values[-3:]
@@ -235,7 +241,7 @@ class System:
         return np.array([inertia / own, friction / scale, load])
 
     def own_acceleration(self) -> float:
-        """Part of the acceleration that the other columns do not make."""
+        """Return the part of the acceleration that the other columns do not explain."""
         others = self.matrix[:, 1:]
         rest = self.matrix[:, 0] - others @ _least(others, self.matrix[:, 0])
         return float(np.sqrt(np.mean(rest**2)))
@@ -244,7 +250,7 @@ class System:
 def _system(smooth: Smooth, rows: Any) -> System:
     v = smooth.velocity[rows]
     curve = _curve(np.abs(v))
-    # What friction has in common in both directions cannot be distinguished from a torque over the position.
+    # Friction common to both directions cannot be distinguished from a torque over the position.
     odd = curve * np.sign(v)[:, None]
     matrix = np.column_stack([smooth.acceleration[rows], odd, curve, _place(smooth.position[rows])])
     size: Array = np.sqrt(np.mean(matrix**2, axis=0))
@@ -252,22 +258,22 @@ def _system(smooth: Smooth, rows: Any) -> System:
 
 
 def _least(matrix: Array, target: Array) -> Array:
-    """Least squares; the smallest values where several serve."""
+    """Solve least squares with the minimum norm."""
     return cast("tuple[Array, ...]", np.linalg.lstsq(matrix, target, rcond=1e-9))[0]
 
 
 def _hats(x: Array, knots: Array) -> Array:
-    """Piecewise linear functions, one at each knot, (n, k)."""
+    """Return piecewise linear functions, one at each knot, shape (n, k)."""
     return np.stack([np.interp(x, knots, e) for e in np.eye(knots.size)], axis=1)
 
 
 def _curve(speed: Array) -> Array:
-    """Piecewise linear functions of the speed."""
+    """Return piecewise linear functions of the speed."""
     return _hats(speed, np.unique(np.percentile(speed, np.linspace(0.0, 100.0, KNOTS))))
 
 
 def _place(q: Array) -> Array:
-    """Functions of the position: harmonics of a turn, or of a shorter way piecewise linear ones."""
+    """Return functions of the position: harmonics of a turn, or piecewise linear ones over a shorter range."""
     if np.ptp(q) > 2.2 * math.pi:
         angles = [k * q for k in range(1, HARMONICS + 1)]
         return np.stack([f(x) for x in angles for f in (np.sin, np.cos)], axis=1)
@@ -278,7 +284,7 @@ def _place(q: Array) -> Array:
 
 
 def _blocks(parts: Array, torque: Array, count: int) -> Blocks:
-    """Every block's regression of the torque on the parts; variances allow for correlated residuals."""
+    """Regress the torque on the parts in every block; variances allow for correlated residuals."""
     pieces: list[Any] = np.array_split(np.arange(torque.size), count)
     friction = float(np.mean(np.abs(parts[:, 1])))
     values, variances = np.zeros((count, 3)), np.full((count, 3), np.inf)
@@ -297,7 +303,7 @@ def _blocks(parts: Array, torque: Array, count: int) -> Blocks:
 
 
 def _by_itself(x: Array) -> Array:
-    """Size of what of each column the others do not make: nothing of friction and load where a block moves one way."""
+    """Return the norm of each column's part independent of the others: 0 for friction and load in one-way motion."""
     each = [
         x[:, k] - x[:, others] @ _least(x[:, others], x[:, k])
         for k, others in enumerate(([1, 2], [0, 2], [0, 1]))
@@ -306,7 +312,7 @@ def _by_itself(x: Array) -> Array:
 
 
 def _change(blocks: Blocks, part: int, weight: float) -> Change | None:
-    """The step or trend that stands out most; None where none does, or it is of no weight in the torque."""
+    """Return the most significant step or trend; None if none is significant or large enough in the torque."""
     told = np.flatnonzero(blocks.told[:, part])
     count = told.size
     if count < FEWEST_BLOCKS // 2:
@@ -333,8 +339,10 @@ def _change(blocks: Blocks, part: int, weight: float) -> Change | None:
 
 
 def _contrast(x: Array, noise: Array, shape: Array) -> tuple[float, float, float]:
-    """Value at 0 and rise of a shape over the blocks, and the rise's standard deviation, from each block's own noise
-    and from the scatter that is left between the blocks."""
+    """Fit value at 0 and rise of a shape over the blocks; return both with the rise's standard deviation.
+
+    It includes each block's own noise and the remaining scatter between the blocks.
+    """
     matrix = np.column_stack([np.ones(x.size), shape])
 
     def solved(between: float) -> tuple[Array, Array, float, float]:
@@ -347,7 +355,7 @@ def _contrast(x: Array, noise: Array, shape: Array) -> tuple[float, float, float
     between = 0.0
     values, inverse, excess, weight = solved(between)
     for _ in range(30):
-        # The scatter between the blocks at which their residuals are as large as they should be.
+        # Scatter between the blocks at which their residuals have the expected size.
         step = excess / weight
         if abs(step) < 1e-3 * (between + 1e-12) or (excess <= 0.0 and between == 0.0):
             break
@@ -357,7 +365,7 @@ def _contrast(x: Array, noise: Array, shape: Array) -> tuple[float, float, float
 
 
 def _where(parts: Array, torque: Array, blocks: Blocks, change: Change) -> int:
-    """The row at which what holds before passes to what holds behind, with the least squared error."""
+    """Return the row of the change, at which the models before and after it have the least squared error."""
     friction = float(np.mean(np.abs(parts[:, 1])))
     x = np.column_stack([parts[:, 0], parts[:, 1], np.full(torque.size, friction)])
     y = torque - parts[:, 2]

@@ -1,4 +1,4 @@
-"""Whether the axis was moved enough for friction to show."""
+"""Whether the motion is sufficient for friction to show."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stickslip.identification.doctor.view import NEVER, View
 
 
 def channels(view: View) -> Iterator[Finding]:
-    """What no identification can do without."""
+    """Yield findings on missing channels that an identification requires."""
     if not (view.has("position") or view.has("velocity")):
         yield Finding(
             "error",
@@ -61,7 +61,7 @@ def channels(view: View) -> Iterator[Finding]:
 
 
 def moved(view: View) -> Iterator[Finding]:
-    """A motor that never moved; a torque that never changed."""
+    """Yield an error if the motor never moved or the torque never changed."""
     for channel in ("position", "velocity"):
         if view.has(channel) and view.time.size >= 20:
             if (still := _standing(view, channel)) is not None:
@@ -81,7 +81,7 @@ def moved(view: View) -> Iterator[Finding]:
 
 
 def _standing(view: View, channel: str) -> Finding | None:
-    """The finding, if a position or velocity shows nothing but a flickering count or noise."""
+    """Return an error if a position or velocity shows only a flickering count or noise."""
     values = view.values(channel)
     span, unit = float(np.ptp(values)), view.record.units[channel]
     remedy = "check the enable signal, the brake and the torque limit; break-away needs a larger torque"
@@ -107,7 +107,7 @@ def _standing(view: View, channel: str) -> Finding | None:
 
 
 def reversed_and_slow(view: View, stribeck_velocity: float | None = None) -> Iterator[Finding]:
-    """Reversals, a whole revolution, slow speeds."""
+    """Yield findings on missing reversals, less than a revolution, and missing slow speeds."""
     smooth = view.smooth
     if smooth is None or smooth.fast <= 0.0:
         return

@@ -1,4 +1,4 @@
-"""A torque without its sign: drives trace the magnitude, too, as torque or as utilisation."""
+"""A torque without its sign: drives can trace the magnitude, too, as torque or utilisation."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from stickslip.identification.doctor.physics import line_of, usable
 from stickslip.identification.doctor.view import Smooth, View
 
 BOTH = 0.1
-"""Share of the moving rows in either direction, and with either sign of the acceleration, that is motion both ways."""
+"""Least share of the moving rows in either direction, and with either sign of acceleration, that is motion both
+ways."""
 TURNED, ROUNDS = 0.5, 4
-"""Part of what the torque as recorded leaves that is left once each row has the sign that its motion asks for, and how
-often these signs are asked for."""
+"""Greatest residual, relative to that of the recorded torque, once each row has the sign that its motion requires;
+number of iterations of these signs."""
 REACHES, UNEXPLAINED = 0.02, 0.5
-"""Part of the largest torque that a magnitude comes down to wherever its torque changes sign, and part of the torque
-that a line then explains at most: a weight that outweighs friction and acceleration is explained."""
+"""Part of the largest torque to which a magnitude falls when its torque changes sign; and part of the torque that a
+line then explains at most: a weight that exceeds friction and acceleration is explained by more."""
 
 
 def unsigned(view: View) -> Iterator[Finding]:
-    """A torque that is never below 0 while the axis moves and accelerates both ways, as no weight explains it."""
+    """Yield a finding if the torque is never negative while the axis moves and accelerates in both directions."""
     smooth = usable(view)
     if smooth is None or view.torque_channel != "motor_torque":
         return
@@ -54,7 +55,7 @@ def unsigned(view: View) -> Iterator[Finding]:
 
 
 def _least_rest(smooth: Smooth) -> float:
-    """What is left of the torque once every row has the sign that inertia and friction ask for."""
+    """Return the residual of the torque once every row has the sign that inertia and friction require."""
     sign, least = np.sign(smooth.velocity), math.inf
     for _ in range(ROUNDS):
         signed = replace(smooth, torque=sign * smooth.torque)

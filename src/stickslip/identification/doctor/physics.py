@@ -1,8 +1,8 @@
-"""Torque and motion together: J dv/dt = T - T_f must be able to hold, and friction must brake.
+"""Torque and motion together: J dv/dt = T - T_f must be possible, and friction must dissipate.
 
-A straight line in acceleration, direction and velocity, T = J a + T_c sign(v) + b v + T_0 (+ gravity), is fitted to
-the filtered record (inverse dynamics; Gautier and Khalil's regression for one axis): enough to see a sign, a delay
-and a load that depends on the position, whatever the law of friction.
+A line in acceleration, direction and velocity, T = J a + T_c sign(v) + b v + T_0 (+ gravity), is fitted to the filtered
+record (inverse dynamics; Gautier and Khalil's regression for one axis): enough to detect a wrong sign, a delay and a
+load that depends on the position, whatever the law of friction.
 """
 
 from __future__ import annotations
@@ -22,48 +22,47 @@ from stickslip.identification.fit.uncertainty import RATIO
 from stickslip.readers.convert import pendulum_before_gear
 
 ROWS = 20_000
-"""Rows of a regression: more tell no more."""
+"""Most rows of a regression: more add no information."""
 FEWEST = 50
-"""Rows in motion, away from the ends of the record, that a regression needs."""
+"""Fewest rows in motion, away from the ends of the record, for a regression."""
 QUARTER = 90.0
-"""Of a turn, in degrees, that a pendulum must swing over to be told from a spring."""
+"""Least swing of a pendulum, degrees, to distinguish it from a spring."""
 IN_DEGREES, CLOSER, APART = 360.0 / math.tau, 0.5, 1.1
-"""Turns of 2 pi in 360; part of what these leave of the torque below which another number of turns explains it; and by
-how much that is another one."""
+"""Turns of 2 pi in 360; residual relative to these below which another number of turns explains the torque; and least
+ratio of that number to them."""
 EXTRAPOLATED = 5.0
-"""Times what the record shows of it that a torque over the turn may be: a pendulum that swings by 12 degrees to either
-side shows a fifth."""
+"""Greatest ratio of a torque over the turn to what the record shows of it: a pendulum that swings by 12 degrees to
+either side shows a fifth."""
 BOTH = 0.05
-"""Share of the moving rows in either direction below which friction is not told from a constant torque."""
+"""Least share of the moving rows in either direction for friction and a constant torque to be distinguished."""
 STRETCHES, SURE = 12, 3.0
-"""Stretches of the jackknife of friction's work, and its standard deviations below zero that make an error."""
+"""Segments of the jackknife of friction's work; standard deviations below zero that make an error."""
 LATE, STROKE, EARLY = 0.12, 0.25, 0.03
-"""s over which such a delay is looked for: farther only within a part of the usual stroke, so far in any case."""
+"""Longest delay searched, s: more only within a part `STROKE` of the usual stroke, `EARLY` in any case."""
 BETTER = 2.0
-"""Times as much that any shorter one must leave."""
+"""Least ratio of the residual with any shorter delay."""
 SHOWS = 2.0
-"""Times as much that is left without an inertia, where such a delay is told that is longer than `EARLY`."""
+"""Least ratio of the residual without an inertia, for a delay longer than `EARLY`."""
 ROUGHLY = 0.15
-"""Of one longer than `EARLY`, by which it may be wrong: wind-up and play shift reversals, too."""
+"""Relative uncertainty of a delay longer than `EARLY`: wind-up and play shift reversals, too."""
 MANY, CLEARLY, HARM = 9, 10.0, 1e-3
-"""Rows from which on a delay that reversals alone show is told, how many times as much none must leave, and part of the
-torque's variance that this must be. Play, wind-up, tuning steps and flexible trains left 3 times as much at most where
-that was worth a word; at 1.25 times they made 9 false delays of 187 logs."""
+"""For a delay shown by reversals alone: fewest rows, least ratio of the residual without it, and least part of that
+residual in the torque's variance. Play, wind-up, tuning steps and flexible trains stay below this ratio."""
 WEIGHT, TOLD = 0.3, 0.25
-"""Of Coulomb friction, from which on a constant torque is worth a word; and half the interval within which it is told,
-of its value."""
+"""Least constant torque that is reported, part of Coulomb friction; greatest half-width of its interval, part of its
+value."""
 TENTH, HELD, STRANGE, STRANGE_TIME = 0.1, 0.5, 1.5, 1.5e-3
-"""Rows by which a torque acts beside its row that are worth a word; that any hold makes, and to which it must be known
-if it may be one; rows and s from which on no hold explains it."""
+"""Offset of the torque from its row, rows: least that is reported; greatest of any hold, and precision required to be
+one; and least that no hold explains, rows and s."""
 PULLS = 0.5
-"""Of the torque, that a positive inertia takes at least for its sign to be right."""
+"""Least part of the torque due to a positive inertia for its sign to be right."""
 RANK = 1e-10
-"""Part of the largest singular value below which a direction is not told."""
+"""Part of the largest singular value below which a direction is undetermined."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A fitted line: inertia, Coulomb, viscous, constant, and what follows; the share of the variance explained."""
+    """A fitted line: inertia, Coulomb, viscous, constant and further coefficients; explained share; residual."""
 
     values: Array
     explained: float
@@ -71,7 +70,7 @@ class Fit:
 
 
 def sign(view: View) -> Iterator[Finding]:
-    """The work of friction over the record: it cannot be negative."""
+    """Yield a finding if the work of friction over the record is negative."""
     smooth = usable(view)
     if smooth is None:
         return
@@ -87,7 +86,7 @@ def sign(view: View) -> Iterator[Finding]:
         return
     pull = fit.values[0] * float(np.sqrt(np.mean(smooth.acceleration**2)))
     if not measured and pull > PULLS * float(np.sqrt(np.mean(smooth.torque**2))):
-        return  # Of a turned torque the inertia would be negative: this one acts late.
+        return  # With an inverted torque sign the inertia would be negative: this torque is delayed.
     if measured:
         message = "friction is negative where the velocity is positive: it is the force on the moving body"
         remedy = f"say {turned}: here friction opposes positive velocity"
@@ -103,12 +102,12 @@ def sign(view: View) -> Iterator[Finding]:
 
 
 def _both_ways(smooth: Smooth) -> bool:
-    """Whether friction is told from a constant torque: the axis moves in both directions."""
+    """Return whether the axis moves in both directions, which distinguishes friction from a constant torque."""
     return BOTH < float(np.mean(smooth.velocity[smooth.moving] > 0.0)) < 1.0 - BOTH
 
 
 def _one_way(smooth: Smooth, view: View, turned: str) -> Iterator[Finding]:
-    """Where the axis moves one way only, friction and a load that drives it are one constant: no more than doubts."""
+    """Yield a warning, at most, for one-way motion: friction and a load that drives the axis are then one constant."""
     power = smooth.torque * smooth.velocity
     stops = abs(smooth.velocity[-1]) < 0.5 * abs(smooth.velocity[0])
     if float(np.mean(power)) < -0.5 * float(np.mean(np.abs(power))) and not stops:
@@ -120,7 +119,7 @@ def _one_way(smooth: Smooth, view: View, turned: str) -> Iterator[Finding]:
 
 
 def _braking(smooth: Smooth, *, measured: bool) -> tuple[float, float]:
-    """Mean power that friction takes over the moving rows, and its standard deviation: a jackknife over stretches."""
+    """Return friction's mean power over the moving rows and its standard deviation, by a jackknife over segments."""
     rows = _rows(smooth)
     v = smooth.velocity[rows]
     matrix = _matrix(smooth, rows, measured=measured)
@@ -129,7 +128,7 @@ def _braking(smooth: Smooth, *, measured: bool) -> tuple[float, float]:
     torque = smooth.torque[rows]
 
     def power(without: int) -> float:
-        """Without one of the stretches; with all where that is negative."""
+        """Return the power without one of the segments; with all if `without` is negative."""
         kept = stretch != without
         x: Array = matrix[kept]
         values: Array = np.linalg.pinv(x.T @ x) @ (x.T @ torque[kept])
@@ -146,7 +145,7 @@ def skew(view: View) -> Iterator[Finding]:
     if smooth is None:
         return
     late, half, row, shows, sure = _skew_in_sliding(view)
-    # Many rows at once look like no delay to sliding, and like nothing else to reversals.
+    # A delay of many rows looks like none in sliding, but is unmistakable at reversals.
     if (at_reversals := _skew_at_reversals(smooth)) is not None:
         late, sure = at_reversals, True
         half = ROUGHLY * abs(late) if abs(late) > EARLY else smooth.period
@@ -169,7 +168,7 @@ def skew(view: View) -> Iterator[Finding]:
 
 
 def _skew_in_sliding(view: View) -> tuple[float, float, float, bool, bool]:
-    """Delay, its half-width and the row, s; whether something accelerates, which alone tells it, and surely."""
+    """Return delay, half-width and row, s; whether acceleration determines the delay; and whether that is certain."""
     if (found := view.sliding) is None:
         return 0.0, math.inf, view.period, False, False
     number, inertia = found.numbers["skew"], found.numbers["inertia"]
@@ -178,9 +177,9 @@ def _skew_in_sliding(view: View) -> tuple[float, float, float, bool, bool]:
 
 
 def _skew_at_reversals(smooth: Smooth) -> float | None:
-    """The delay of many rows at which reversals of torque and motion fit, s, where nothing else fits by far; else None.
+    """Return the delay of many rows at which reversals of torque and motion fit, s; None if others fit almost as well.
 
-    Play, wind-up, ringing and a feedforward shift reversals too, but none fits them ten times as well as no delay.
+    Play, wind-up, ringing and a feedforward shift reversals too, but none improves the fit tenfold over no delay.
     """
     reach = _reach(smooth)
     if _inside(smooth, reach).size < FEWEST:
@@ -191,30 +190,32 @@ def _skew_at_reversals(smooth: Smooth) -> float | None:
     if abs(shifts[best]) < MANY or best in (0, shifts.size - 1) or rests[shifts == 0][0] < least:
         return None
     shift, rest = int(shifts[best]), float(rests[best])
-    # While it stands its torque turns unseen: of a shift within that, only what accelerates the axis tells.
+    # At standstill the torque reverses unseen: a shift within that time is determined by acceleration only.
     unseen = abs(shift) < smooth.standstill and not _accelerates(smooth, shift, rest, reach)
     late = shift * smooth.period
     return None if unseen or (abs(late) > EARLY and not _is_far(smooth, shift, rest, reach)) else late
 
 
 def _is_far(smooth: Smooth, shift: int, rest: float, reach: int) -> bool:
-    """Whether a shift beyond `EARLY`, which leaves `rest`, is one: neither a shorter one nor dwelling explains it."""
+    """Return whether a shift beyond `EARLY` is genuine: neither a shorter one nor dwelling explains it."""
     near = int(EARLY / smooth.period) + 1
     shorter = shifts_looked_at(lambda these: _rests(smooth, these, reach), near, 30)
-    # A shake fits itself some periods later.
+    # A vibration fits itself some periods later.
     if BETTER * rest > least_between(*shorter):
         return False
     return _accelerates(smooth, shift, rest, reach)
 
 
 def _accelerates(smooth: Smooth, shift: int, rest: float, reach: int) -> bool:
-    """Whether a shift that leaves `rest` shows an inertia: where the axis dwells at every reversal its torque turns
-    late, too; what accelerates it does not."""
+    """Return whether a shift with residual `rest` shows an inertia.
+
+    If the axis dwells at every reversal, its torque reverses late, too, but acceleration is unaffected.
+    """
     return bool(_rests(smooth, [shift], reach, accelerates=False)[0] >= SHOWS * rest)
 
 
 def _reach(smooth: Smooth) -> int:
-    """Samples over which a delay is looked for: no more than a part of a stroke, which would fit the one before."""
+    """Return the longest delay searched, samples: a part of a stroke, since more would fit the stroke before."""
     sides = np.sign(smooth.velocity[smooth.moving])
     strokes = 1 + np.count_nonzero(np.diff(sides))
     stroke = np.count_nonzero(smooth.moving) / strokes
@@ -223,7 +224,7 @@ def _reach(smooth: Smooth) -> int:
 
 
 def gravity(view: View) -> Iterator[Finding]:
-    """A mean torque that comes back with every turn: gravity; or a constant one."""
+    """Yield a finding on a mean torque that repeats every turn (gravity), or on a constant torque."""
     smooth = usable(view)
     if smooth is None or view.torque_channel != "motor_torque":
         return
@@ -253,16 +254,18 @@ def gravity(view: View) -> Iterator[Finding]:
 
 
 def _once_a_turn(smooth: Smooth, plain: Fit, turns: float) -> tuple[float, float]:
-    """Amplitude of a torque that comes back after so many turns of the position, 0 where it does not or where the
-    record shows little of it; and what that leaves."""
+    """Return the amplitude of a torque with a period of `turns` of the position, and the residual.
+
+    The amplitude is 0 if there is no such torque or the record shows little of it.
+    """
     size = float(np.std(smooth.torque))
     if not np.ptp(smooth.position) > 0.5 * turns or size == 0.0:
         return 0.0, plain.rest
     full = _fit(smooth, 0, periodic=True, turn=turns * math.tau)
     rows = _rows(smooth)
     shows = full.explained > 0.5 and _shows_turn(smooth, rows, plain, full, turns)
-    # Friction that builds up behind a reversal makes the mean of both directions rise over a short way, too: a weight
-    # acts where that is over.
+    # Friction that builds up after a reversal makes the mean of both directions rise over a short distance, too: a
+    # weight still acts where that is over.
     beyond = rows[smooth.gone_on[rows]]
     if shows and beyond.size >= FEWEST and np.ptp(smooth.position) < turns * math.tau:
         line, wave = (_fit(smooth, 0, periodic=p, turn=turns * math.tau, rows=beyond) for p in (False, True))
@@ -271,17 +274,17 @@ def _once_a_turn(smooth: Smooth, plain: Fit, turns: float) -> tuple[float, float
 
 
 def _shows_turn(smooth: Smooth, rows: Any, plain: Fit, full: Fit, turns: float) -> bool:
-    """Whether a torque once in so many turns explains what a line leaves in some rows, and these show much of it."""
+    """Return whether a torque with this period explains a line's residual in some rows, and these show much of it."""
     size, amplitude = float(np.std(smooth.torque)), math.hypot(full.values[4], full.values[5])
     angle = smooth.position[rows] / turns
-    # Of a short part of a turn any bend of the torque makes a wave, with the constant torque against it.
+    # Over a short part of a turn, any bend of the torque fits a wave that the constant torque opposes.
     seen = 0.5 * float(np.ptp(full.values[4] * np.sin(angle) + full.values[5] * np.cos(angle)))
     shows = full.rest < 0.7 * plain.rest and 0.1 * size < amplitude < 20.0 * size
     return shows and seen > max(0.1 * size, amplitude / EXTRAPOLATED)
 
 
 def _offset(view: View, smooth: Smooth, plain: Fit) -> Iterator[Finding]:
-    """Compare a constant torque with Coulomb friction from gross sliding, or else with the whole torque."""
+    """Yield a note on a constant torque that is large against Coulomb friction from sliding or the whole torque."""
     offset, part, found = plain.values[3], "", view.sliding
     weighs = abs(offset) > WEIGHT * float(np.std(smooth.torque)) and plain.explained > 0.5
     large = weighs and _both_ways(smooth)
@@ -302,7 +305,7 @@ def _offset(view: View, smooth: Smooth, plain: Fit) -> Iterator[Finding]:
 
 
 def usable(view: View) -> Smooth | None:
-    """The filtered record, where it has torque and moves, away from its ends."""
+    """Return the filtered record if it has torque and moves away from its ends; else None."""
     smooth = view.smooth
     if smooth is None or not smooth.torque.size or smooth.fast <= 0.0:
         return None
@@ -311,12 +314,12 @@ def usable(view: View) -> Smooth | None:
 
 
 def line_of(smooth: Smooth) -> Fit:
-    """Inertia, Coulomb, viscous and constant part of the torque while it moves."""
+    """Fit inertia, Coulomb, viscous and constant part of the torque in motion."""
     return _fit(smooth, 0)
 
 
 def _hangs_in_degrees(smooth: Smooth, rest: float) -> bool:
-    """Whether the torque is that of a pendulum whose angle is in degrees: on the way forth and on the way back."""
+    """Return whether the torque is that of a pendulum with its angle in degrees, in both directions of motion."""
     forth = float(np.mean(smooth.velocity[smooth.moving] > 0.0))
     if np.ptp(smooth.position) < QUARTER or not 0.2 < forth < 0.8:
         return False
@@ -326,10 +329,12 @@ def _hangs_in_degrees(smooth: Smooth, rest: float) -> bool:
 
 
 def _degrees_or_gear(view: View, smooth: Smooth) -> Finding:
-    """Of a torque that comes back as a pendulum's whose angle is in degrees may: whether a gear explains it better, or
-    as well, since the motor's angle is the load's times its ratio."""
+    """Return whether a gear or degrees explain a torque with a period of 360.
+
+    Behind a gear the motor's angle is the load's times its ratio.
+    """
     far = float(np.ptp(smooth.position)) / (QUARTER / 360.0 * math.tau)
-    # A step is the ratio by which a pendulum over a turn leaves a hundredth of its torque.
+    # The step is the ratio at which a pendulum over a turn has a residual of a hundredth of its torque.
     ratios: Array = np.geomspace(1.5, max(far, 2.0 * IN_DEGREES), 150)
     rests = [_fit(smooth, 0, periodic=True, turn=n * math.tau).rest for n in ratios]
     best = float(ratios[int(np.argmin(rests))])
@@ -354,8 +359,10 @@ def _fit(
     smooth: Smooth, shift: int, *, periodic: bool = False, measured: bool = False, turn: float = 2.0 * math.pi,
     rows: Any = None,
 ) -> Fit:  # fmt: skip
-    """Least squares over the rows that move, or some of them, with the torque taken `shift` samples later; `turn` is
-    one of the position in its unit."""
+    """Fit a line by least squares over the moving rows, or some, with the torque taken `shift` samples later.
+
+    `turn` is one turn of the position in its unit.
+    """
     rows = _rows(smooth) if rows is None else rows
     matrix = _matrix(smooth, rows, measured=measured)
     if periodic:
@@ -371,8 +378,10 @@ def _fit(
 
 
 def _rests(smooth: Smooth, shifts: Iterable[int], reach: int = 60, *, accelerates: bool = True) -> Array:
-    """`Fit.rest` with the torque taken so many samples later, at most `reach`, shape (shifts,); with an inertia or
-    without."""
+    """Return `Fit.rest` with the torque taken so many samples later, at most `reach`, shape (shifts,).
+
+    `accelerates` includes an inertia.
+    """
     rows = _rows(smooth, reach)
     matrix = _matrix(smooth, rows, measured=False)[:, 0 if accelerates else 1 :]
     basis, sizes, _ = np.linalg.svd(matrix / _sizes(matrix), full_matrices=False)
@@ -383,26 +392,26 @@ def _rests(smooth: Smooth, shifts: Iterable[int], reach: int = 60, *, accelerate
 
 
 def _sizes(matrix: Array) -> Array:
-    """Root mean squares of the columns, 1 for those that are 0."""
+    """Return the root mean squares of the columns, 1 for those that are 0."""
     size: Array = np.sqrt(np.mean(matrix**2, axis=0))
     return np.where(size == 0.0, 1.0, size)
 
 
 def _rows(smooth: Smooth, reach: int = 60) -> Any:
-    """No more of `_inside` than are needed."""
+    """Return `_inside`, thinned out to `ROWS`."""
     rows = _inside(smooth, reach)
     return rows[:: max(1, rows.size // ROWS)]
 
 
 def _inside(smooth: Smooth, reach: int = 60) -> Any:
-    """Rows that move, so many away from the ends."""
+    """Return the moving rows, at least `reach` rows away from the ends."""
     count = smooth.velocity.size
     edge = min(max(reach, 60), count // 8)
     return np.flatnonzero(smooth.moving[edge : count - edge]) + edge
 
 
 def _matrix(smooth: Smooth, rows: Any, *, measured: bool) -> Array:
-    """Acceleration, direction, velocity, one."""
+    """Return the columns acceleration, direction, velocity and one."""
     v = smooth.velocity[rows]
     inertia = np.zeros_like(v) if measured else smooth.acceleration[rows]
     return np.stack([inertia, np.sign(v), v, np.ones_like(v)], axis=1)

@@ -1,8 +1,8 @@
-"""Backlash: after each reversal the motor travels without the load, until the teeth meet and stop it at once.
+"""Backlash: after each reversal the motor travels without the load until the teeth meet and stop it abruptly.
 
-The position must be the motor's. What distinguishes play from stick-slip and from an elastic drivetrain: until then the
-torque stays below that of sliding, the motor then loses a good part of its speed within two rows, where a wound-up
-drivetrain brakes it over its whole oscillation, and it does so after the same travel at every reversal.
+The position must be the motor's. Play is distinguished from stick-slip and from an elastic drivetrain: the torque stays
+below that of sliding until the teeth meet; the motor then loses a good part of its speed within two rows, while a
+wound-up drivetrain brakes it over its whole oscillation; and this happens after the same travel at every reversal.
 """
 
 from __future__ import annotations
@@ -21,54 +21,54 @@ from stickslip.identification.doctor.physics import line_of, usable
 from stickslip.identification.doctor.view import Array, Smooth, View
 
 ROW = 1e-3
-"""s of a row, for which what follows is counted in rows. Of 23 machines with play of another simulator, logged at 4
-kHz, 10 are found, and none was; every interval holds the gap."""
+"""Row period, s, to which a faster log is thinned out, since the limits below are in rows."""
 REVERSALS = 3
 ROWS = 15
-"""Rows, at least, of the travel that is looked at."""
+"""Fewest rows of the travel."""
 CREEPS = 0.01
-"""Of the usual speed, up to which the axis may stick, and its velocity be the filter's."""
+"""Part of the usual speed below which the axis may stick and its velocity is the filter's."""
 SHARE = 0.1
-"""Of the usual way between two reversals, within which play is sought."""
+"""Part of the usual distance between two reversals within which play is searched."""
 TURNS = 30
-"""Rows before the axis creeps, from which on the encoder's extreme is sought."""
+"""Rows before the axis creeps from which on the encoder's extreme is searched."""
 COARSE = 0.17
-"""Of the free travel, that a row may be when the teeth meet: an elastic drivetrain's swing in few rows looks alike."""
+"""Greatest travel of a row when the teeth meet, part of the free travel: an elastic drivetrain's swing is similar in
+few rows."""
 LONGER = 90.0
-"""Percentile of the ways, of which `SHARE` is a way that counts: shorter ones are overshoots."""
+"""Percentile of the distances between reversals, of which `SHARE` is the least that counts: shorter ones are
+overshoots."""
 STEPS = 10.0
-"""Steps of the encoder that the play must last."""
+"""Least play, steps of the encoder."""
 SEEN = 4.0
-"""Steps of the encoder in a row, at least, at which the motor travels when the teeth meet."""
+"""Least travel of the motor per row when the teeth meet, steps of the encoder."""
 HARDLY = 0.9
-"""Of the greatest speed, above which a row lies before the meeting, most of it."""
+"""Part of the greatest speed above which a row is still before the teeth meet."""
 LOST = 0.35
-"""Part of its speed that the motor loses, at three reversals of four."""
+"""Part of its speed that the motor loses, at three of four reversals."""
 LEVEL = 0.0, 0.85
-"""Of sliding friction, that the motor alone has: a jump out of stiction has more, a rebound less."""
+"""Torque of the motor alone, part of sliding friction: a jump out of stiction has more, a rebound less."""
 ALIKE = 0.25
-"""Spread of the travel over the reversals, between quartiles, of its median."""
+"""Greatest interquartile range of the travel over the reversals, part of its median."""
 SLOWS, SUDDEN = 10, 0.5
-"""Rows within which it has lost what it loses, and the part of that which two of them take, at least: an elastic
-drivetrain took 0.38 at most, play 0.56 at least (seeds 8000 to 8019 of `benchmarks/ordinary_logs.py`)."""
+"""Rows within which the whole speed is lost; least part of that loss in two rows: an elastic drivetrain brakes more
+gradually."""
 FREE = 0.1
-"""Of the speed at which the teeth meet, from which on the motor has left its friction before sliding."""
+"""Part of the speed at which the teeth meet, above which the motor has left presliding."""
 QUANTILE = 1.96
 
 
 @dataclass(frozen=True)
 class DeadTravel:
-    """Free travel of the motor after a reversal, from where it slides until it takes the load along, in the position's
-    unit.
+    """Free travel of the motor after a reversal, from sliding until it takes the load along, in the position's unit.
 
     Attributes
     ----------
     value, std : float
     lower, upper : float
-        95 % interval: what the drivetrain unwinds after the reversal, as much winding up where the teeth meet, and a
-        row on both sides.
+        95 % interval; includes the drivetrain's unwinding after the reversal, as much winding up when the teeth meet,
+        and one row on both sides.
     reversals : int
-        At which it was seen.
+        Number of reversals at which it was seen.
     """
 
     value: float
@@ -79,8 +79,11 @@ class DeadTravel:
 
 
 class Meeting(NamedTuple):
-    """One reversal: travel since it and since sliding, that of a row when the teeth meet; share of speed lost in two
-    rows; torque of the free travel over sliding friction; share of the whole loss that the two rows take."""
+    """One reversal at which the teeth meet.
+
+    Travel since the reversal and since sliding; travel of a row when the teeth meet; share of speed lost in two rows;
+    torque of the free travel over sliding friction; share of the whole loss in these two rows.
+    """
 
     gone: float
     free: float
@@ -91,7 +94,7 @@ class Meeting(NamedTuple):
 
 
 def backlash(view: View) -> Iterator[Finding]:
-    """A dead travel after reversals."""
+    """Yield a warning if the motor has dead travel after reversals."""
     found = dead_travel(view)
     if found is None:
         return
@@ -107,16 +110,16 @@ def backlash(view: View) -> Iterator[Finding]:
 
 
 def dead_travel(view: View) -> DeadTravel | None:
-    """The dead travel of the motor at its reversals; None where the record shows none.
+    """Return the dead travel of the motor at its reversals; None if the record shows none.
 
     Parameters
     ----------
     view : View
-        Of a record with the motor's position and ``motor_torque``.
+        View of a record with the motor's position and ``motor_torque``.
     """
     if view.torque_channel != "motor_torque" or not view.has("position"):
         return None
-    # Teeth meet in milliseconds, not in rows: a faster log is looked at as one of that clock.
+    # Teeth meet within milliseconds, not rows: a faster log is thinned out to that clock.
     step, view = view.step, _at_rate(view)
     smooth = usable(view)
     if smooth is None:
@@ -130,7 +133,7 @@ def dead_travel(view: View) -> DeadTravel | None:
 
 
 def _at_rate(view: View) -> View:
-    """The record with every so many of its rows that one lasts `ROW` at least."""
+    """Return the record thinned out to rows of at least `ROW`."""
     every = round(min(ROW / view.period, view.time.size)) if view.period > 0.0 else 1
     if every < 2:
         return view
@@ -140,12 +143,14 @@ def _at_rate(view: View) -> View:
 
 
 def _meetings(view: View, smooth: Smooth, level: Array, step: float) -> Iterator[Meeting]:
-    """Of each way after a reversal, where the motor loses most speed; `level`: torque over sliding friction; `step`: of
-    the encoder."""
+    """Yield the greatest loss of speed after each reversal.
+
+    `level`: torque over sliding friction; `step`: of the encoder.
+    """
     v = smooth.velocity
     moving = np.flatnonzero(np.abs(v) > CREEPS * smooth.fast)
     turned = np.flatnonzero(np.diff(np.sign(v[moving])) != 0.0)
-    # The last row of the old way, and the first of the new one: the axis may stick between them.
+    # Last row of the old direction and first of the new one: the axis may stick between them.
     turns = list(zip(moving[turned].tolist(), moving[turned + 1].tolist(), strict=True))
     if len(turns) <= REVERSALS:
         return
@@ -155,7 +160,7 @@ def _meetings(view: View, smooth: Smooth, level: Array, step: float) -> Iterator
     far = SHARE * float(np.median(ways))
     long = SHARE * float(np.percentile(ways, LONGER))
     for before, way, ((a, start), (b, _)) in zip(ways, ways[1:], list(pairwise(turns))[1:], strict=False):
-        # Only a way that began on the other flank has the whole play before it; an overshoot has not.
+        # Only a stroke that started on the other flank crosses the whole play; an overshoot does not.
         if min(before, way) < long:
             continue
         side = 1.0 if v[start] > 0.0 else -1.0
@@ -168,7 +173,7 @@ def _meetings(view: View, smooth: Smooth, level: Array, step: float) -> Iterator
 
 
 def _meeting(gone: Array, level: Array, seen: float) -> Iterator[Meeting]:
-    """Where two rows lose most speed; slower than `seen` a row, none is told from the encoder's steps."""
+    """Yield the two rows with the greatest loss of speed; below `seen` per row it is the encoder's steps."""
     rows = np.diff(gone)
     drop = (np.minimum(rows[:-3], rows[1:-2]) - rows[3:])[: 1 - SLOWS]
     k = int(np.argmax(drop))
@@ -188,7 +193,7 @@ def _meeting(gone: Array, level: Array, seen: float) -> Iterator[Meeting]:
 
 
 def _alike(seen: list[Meeting], step: float) -> DeadTravel | None:
-    """What all reversals say, where they say the same."""
+    """Combine all reversals if they agree; else None."""
     gone, free, row, lost, level, sudden = np.array(seen).T
     low, width, high = np.percentile(gone, [25, 50, 75]).tolist()
     certain = np.percentile(lost, 25) >= LOST and np.median(sudden) >= SUDDEN

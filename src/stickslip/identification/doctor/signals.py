@@ -1,4 +1,4 @@
-"""Each signal by itself: missing values, flat tops, steps of the encoder, wrapped angles."""
+"""Checks of single signals: missing values, flat tops, steps of the encoder, wrapped angles."""
 
 from __future__ import annotations
 
@@ -17,35 +17,35 @@ from stickslip.readers.cut import FEWEST as PIECE
 from stickslip.readers.cut import RANGE, jumps
 
 WINDOW = 0.1
-"""s: the window over which a slow speed is told from the counts it gives."""
+"""Window over which a slow speed is computed from counts, s."""
 SLOW_ERROR = 0.05
 PILED = 5
-"""Times as often as values beside it that an extreme occurs where peaks are cut off; a rounded sine's: 2.4 times."""
+"""Frequency of a cut-off extreme relative to values near it; that of a rounded sine is about half of it."""
 OUTRUN = 1.01
-"""Times a velocity at its limit that the position goes there: a plateau that is commanded is none (4 logs of 187)."""
+"""Ratio of the position's speed to a velocity at its limit; a commanded plateau is not a limit."""
 NEAR, AT_ONCE, ELSEWHERE = 0.05, 3.0, 0.2
-"""Of the range: values beside an extreme; steps of a rounded column, from more than which a limit is reached at once;
-share of the rows that stand still elsewhere, from which on an extreme must stand out from all of its size. Of 187 + 240
-logs those at their limit in 0.35 % of the rows are found, but two of which six rows show it, and no other."""
+"""Part of the range that is near an extreme; steps of a rounded column above which a limit is reached at once; share of
+rows at rest elsewhere above which an extreme must stand out from all values of its size."""
 COUNTED, SOURCE, REPEATED, CATCHES_UP, FEWEST = 3.0, 20, 0.15, 1.15, 50
-"""Steps of the encoder by which a row moves on where its position must be a new one; rows on end that a slow source may
-repeat: at a stop there are more; share of those rows from which on it is told; times the way of a row that a new
-position is away from one that stood; and how many rows there must be."""
+"""Least movement per row, steps of the encoder, for its position to be new; greatest number of rows that a slow source
+repeats, fewer than at a stop; least share of repeated rows; least ratio of a new position's step to the movement per
+row; fewest rows."""
 FEW_STRETCHES, LONG_PART, GOES = 3, 0.3, 0.1
-"""Stretches at a limit that a remedy names one by one; share of the rows from which on a part without is worth using,
-and of the part's rows that must move."""
+"""Most segments at a limit that a remedy lists; least share of the rows for a part without a limit to be useful; least
+share of its rows that must move."""
 LOST = 1.5
-"""Times from row to row, from which on a row is missing."""
+"""Ratio of a time step to the period above which a row is missing."""
 LEAPS = 99.0
-"""Percentile of the changes of torque that a leap exceeds."""
+"""Percentile of the torque's changes that a leap exceeds."""
 SMALLEST = 1e-12
-"""rad, N·m, A, ...: below what encoders (nrad), torque sensors (nN·m) and current sensors of axes resolve."""
+"""Smallest plausible signal, rad, N·m, A, ...: below the resolution of encoders (nrad) and of torque and current
+sensors."""
 WORTH_A_WORD = 1e-4
-"""Part of the fast speed below which that speed is of no interest: the step is the file's rounding, no encoder's."""
+"""Part of the fast speed below which a speed is irrelevant: the step is the file's rounding, not an encoder's."""
 
 
 def missing(view: View) -> Iterator[Finding]:
-    """Values that are no numbers."""
+    """Yield findings on missing or infinite values."""
     for channel in ("time", *view.record.channels):
         values = view.record[channel]
         bad = np.flatnonzero(~is_number(values))
@@ -66,7 +66,7 @@ def missing(view: View) -> Iterator[Finding]:
 
 
 def too_small(view: View) -> Iterator[Finding]:
-    """Signals so small that no axis has them: their squares and quotients leave the range of numbers."""
+    """Yield errors on implausibly small signals, whose squares and quotients underflow or overflow."""
     for channel in ("position", "velocity", "motor_torque", "friction_torque", "current", "voltage"):
         if not view.has(channel):
             continue
@@ -80,13 +80,13 @@ def too_small(view: View) -> Iterator[Finding]:
 
 
 def saturated(view: View) -> Iterator[Finding]:
-    """Flat tops: a limit of the drive or of the converter is reached."""
+    """Yield findings on flat tops: a limit of the drive or the converter is reached."""
     for channel in ("motor_torque", "friction_torque", "sensor_torque", "current", "voltage", "velocity"):
         if not view.has(channel) or (channel == "current" and view.from_current):
             continue
         values = view.values(channel)
         if values.size and not np.ptp(values) > 0.0:
-            continue  # What never changes is no signal cut off: its own check says so.
+            continue  # A constant signal is not cut off: its own check reports it.
         tops = _flat_tops(values)
         if tops is None or (channel == "velocity" and not _outrun(view, values, tops[0])):
             continue
@@ -99,7 +99,7 @@ def saturated(view: View) -> Iterator[Finding]:
 
 
 def _cut_off(view: View, channel: str, at: Mask, limits: str) -> Finding:
-    """That a signal stands at its limit: in how many rows and stretches, and what is left to do."""
+    """Return the finding that a signal is at its limit: rows, segments and remedy."""
     indices = np.flatnonzero(at)
     stretches = np.split(indices, np.flatnonzero(np.diff(indices) > PIECE) + 1)
     number = view.file_rows[view.usable]
@@ -130,8 +130,10 @@ def _cut_off(view: View, channel: str, at: Mask, limits: str) -> Finding:
 
 
 def _longest_without(view: View, stretches: Sequence[Any], count: int) -> tuple[int, int]:
-    """First row and the one behind the last of the longest part outside all stretches, where it is long and the axis
-    moves there; else 0, 0."""
+    """Return the first row of the longest part outside all segments and the row after its last.
+
+    0, 0 if the part is short or the axis hardly moves in it.
+    """
     begins = np.array([0, *(s[-1] + 1 for s in stretches)])
     ends = np.array([*(s[0] for s in stretches), count])
     best = int(np.argmax(ends - begins))
@@ -145,7 +147,7 @@ def _longest_without(view: View, stretches: Sequence[Any], count: int) -> tuple[
 
 
 def _limited_command(channel: str, limits: str, unit: str, share: float) -> Finding:
-    """That a command stands at the limit that its drive set it: nothing of it was cut off afterwards."""
+    """Return the finding that a command is at its drive's limit: nothing of it was cut off afterwards."""
     message = (
         f"{channel} is commanded and stands at the drive's own limit of {limits} {unit} in {100 * share:.3g} % of the "
         "rows: this is what acts, nothing is lost"
@@ -155,7 +157,7 @@ def _limited_command(channel: str, limits: str, unit: str, share: float) -> Find
 
 
 def _outrun(view: View, velocity: Array, at: Mask) -> bool:
-    """Whether the position goes faster where the velocity stands at its extreme; True where there is no position."""
+    """Return whether the position moves faster where the velocity is at its extreme; True without a position."""
     smooth = view.smooth
     if smooth is None or not view.has("position"):
         return True
@@ -165,7 +167,7 @@ def _outrun(view: View, velocity: Array, at: Mask) -> bool:
 
 
 def _flat_tops(values: Array) -> tuple[Mask, str] | None:
-    """Rows at an extreme, mask, and the extremes in words; None where they are no flat tops."""
+    """Return a mask of the rows at an extreme, and the extremes as text; None if there are no flat tops."""
     size = float(np.max(np.abs(values), initial=0.0))
     if values.size < 50 or size <= 0.0:
         return None
@@ -178,14 +180,14 @@ def _flat_tops(values: Array) -> tuple[Mask, str] | None:
         at = np.abs(values - extreme) <= 1e-9 * size
         if np.count_nonzero(at) < 8 * held or abs(extreme) <= 0.2 * size:
             continue
-        # A rounded peak is reached by single steps; a limit at once.
+        # A rounded peak is reached in single steps; a limit at once.
         into = np.abs(np.diff(values))[at[1:] & ~at[:-1]]
         steps = (
             float(np.median(into)) / step if step > 0.0 and into.size else math.inf if step <= 0.0 else 0.0
         )
         flat = _longest(at[1:] & still) >= 5 * held - 1 and steps > 1.5
         beside = _piled_up(values, at, extreme, NEAR * float(np.ptp(values)))
-        # A commanded staircase or a coarse encoder stands still elsewhere, too, and there at levels of that size.
+        # A commanded staircase or a coarse encoder also rests elsewhere, at levels of similar size.
         if held == 1 and np.count_nonzero(still & ~at[1:]) > ELSEWHERE * np.count_nonzero(~at):
             beside = _piled_up(values, at, extreme, 0.5 * abs(extreme))
             flat = (
@@ -201,7 +203,7 @@ def _flat_tops(values: Array) -> tuple[Mask, str] | None:
 
 
 def _held(values: Array, still: Any) -> int:
-    """Rows for which every value stands, where a slower clock wrote the column; 1 where there is no such clock."""
+    """Return the number of rows that every value lasts in a column with a slower clock; 1 without such a clock."""
     starts = np.concatenate(([0], np.flatnonzero(~still) + 1))
     lengths = np.diff(starts)
     usual = int(np.median(lengths)) if lengths.size > 20 else 1
@@ -209,14 +211,14 @@ def _held(values: Array, still: Any) -> int:
 
 
 def _piled_up(values: Array, at: Any, extreme: float, within: float) -> bool:
-    """Whether the extreme occurs far more often than any value so near it: short peaks that were cut off."""
+    """Return whether the extreme occurs far more often than any value near it: short peaks that were cut off."""
     near = values[(np.abs(values - extreme) < within) & ~at]
     _, counts = np.unique(near, return_counts=True)
     return bool(near.size >= PILED and np.count_nonzero(at) >= PILED * int(np.max(counts, initial=1)))
 
 
 def supply(view: View) -> Iterator[Finding]:
-    """A voltage that stays as it is while the axis turns to and fro: the supply's, not the drive's."""
+    """Yield a warning if a voltage is constant while the axis moves back and forth: the supply's, not the drive's."""
     smooth = view.smooth
     if smooth is None or not view.has("voltage"):
         return
@@ -232,7 +234,7 @@ def supply(view: View) -> Iterator[Finding]:
 
 
 def repeated(view: View) -> Iterator[Finding]:
-    """Rows that say again what was measured before: the file is written faster than its source."""
+    """Yield a warning if rows repeat earlier measurements: the file is written faster than its source."""
     smooth = view.smooth
     if smooth is None or not view.has("position"):
         return
@@ -263,7 +265,7 @@ def repeated(view: View) -> Iterator[Finding]:
 
 
 def _briefly(mask: Any, longest: int) -> Mask:
-    """Where a mask is True for at most so many rows on end."""
+    """Return where a mask is True for at most `longest` consecutive rows."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
     out = np.zeros(mask.size, dtype=np.bool_)
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
@@ -272,13 +274,13 @@ def _briefly(mask: Any, longest: int) -> Mask:
 
 
 def _longest(mask: Any) -> int:
-    """Length of the longest run of True."""
+    """Return the length of the longest run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
     return int(np.max(edges[1::2] - edges[::2], initial=0))
 
 
 def quantised(view: View) -> Iterator[Finding]:
-    """The step of the position and the lowest speed it supports."""
+    """Yield the position's step and the lowest speed that it supports."""
     if not view.has("position") or view.smooth is None:
         return
     step = view.step
@@ -303,12 +305,12 @@ def quantised(view: View) -> Iterator[Finding]:
 
 
 def wrapped(view: View) -> Iterator[Finding]:
-    """Jumps by a whole turn."""
+    """Yield a finding on jumps of the position, by whole turns or otherwise."""
     if not view.has("position") or view.time.size < 30:
         return
     values = view.values("position")
     spiky = sticking_out(values, position=True)
-    if spiky.size:  # a jump that comes back at once is a spike
+    if spiky.size:  # A jump that is undone at once is a spike.
         values = np.delete(values, spiky)
     rows = np.delete(np.flatnonzero(view.usable), spiky)
     at, sizes = jumps(values)
@@ -319,7 +321,7 @@ def wrapped(view: View) -> Iterator[Finding]:
     turn = next((t for t in (2.0 * math.pi, 360.0, 1.0, math.pi) if abs(size / t - 1.0) < 0.05), None)
     wraps = turn is not None or size > RANGE * float(np.ptp(values))
     if not wraps:
-        # While a row is missing, the axis moves on.
+        # During a missing row the axis moves on.
         lost = np.diff(view.record.time[rows])[at] > LOST * view.period
         at = at[~(lost | _driven(view, values, at, spiky))]
         if not at.size:
@@ -345,7 +347,7 @@ def wrapped(view: View) -> Iterator[Finding]:
 
 
 def _counted_within(size: float, unit: str, turn: float | None) -> str:
-    """What a position that jumps by its whole range is: counted within a turn, or by a counter of some turns."""
+    """Describe a position that jumps by its whole range: counted within a turn, or by a counter of some turns."""
     if turn is not None:
         return "it is counted within one turn"
     turns = f", after {size / math.tau:.4g} turns" if unit == "rad" else ""
@@ -353,8 +355,10 @@ def _counted_within(size: float, unit: str, turn: float | None) -> str:
 
 
 def _driven(view: View, position: Array, at: Any, spiky: Any) -> Any:
-    """Of jumps of a position without spikes, whether a torque that leaps to the same side drives them: a step of the
-    reference; a controller answers an encoder's jump to the other side."""
+    """Return for each jump of a position without spikes whether a torque leap to the same side drives it.
+
+    That is a step of the reference; a controller responds to an encoder's jump in the opposite direction.
+    """
     if view.torque_channel != "motor_torque":
         return np.zeros(at.size, dtype=bool)
     leaps: Array = np.diff(np.delete(view.values("motor_torque"), spiky))

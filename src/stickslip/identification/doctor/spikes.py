@@ -1,6 +1,6 @@
-"""Spikes: single rows, up to three, that stick out of a signal and are back at once.
+"""Spikes: one to three rows that stick out of a signal.
 
-A torque that accelerates the axis sticks out, too: where the velocity changes with it, it is no spike.
+A torque that accelerates the axis sticks out, too: if the velocity changes with it, it is not a spike.
 """
 
 from __future__ import annotations
@@ -18,38 +18,35 @@ from stickslip.identification.doctor.view import Array, View, row
 from stickslip.readers.cut import range_words
 
 DRIVING = ("motor_torque", "sensor_torque", "current", "voltage")
-"""Channels that the axis follows with its acceleration."""
+"""Channels whose signal shows in the axis's acceleration."""
 CHANNELS = ("position", "velocity", "motor_torque", "friction_torque", "sensor_torque", "current", "voltage")
 WINDOW = 7
-"""Rows of the running median: what is wider than three of them is a pulse, no spike."""
+"""Rows of the running median: anything wider than three of them is a pulse, not a spike."""
 OUT_OF_RANGE = 4.0
-"""Half ranges of the signal that a spike sticks out, whatever its neighbours do; a wrist that breaks loose: 2.5."""
+"""Size of a spike in half ranges of the signal, whatever its neighbours; break-away of real axes stays below."""
 ALONE, SIZE = 12.0, 0.3
-"""Times the usual excess of a row over both its neighbours, and half ranges, from which on a single row is a spike.
-Break-away, impacts and ringing of real axes (a robot's wrist: 5, EMPS: 3) take several rows."""
+"""Excess of a row over both its neighbours, relative to the usual excess, and half ranges, from which on a single row
+is a spike. Break-away, impacts and ringing of real axes take several rows."""
 JUMP = 20.0
-"""Times the usual step of a position."""
+"""Jump of a position relative to its usual step."""
 FEW = 0.05
-"""Share of the rows up to which they are spikes; more are noise."""
+"""Greatest share of rows that are spikes; more are noise."""
 BACK = 0.25
-"""Of what a spike sticks out, by which the signal may have changed across it."""
+"""Greatest change of the signal across a spike, part of the spike's size."""
 ABRUPT = 0.3
-"""Of what a spike sticks out, by which it leaps from row to row at least; over how far its neighbours lie apart."""
+"""Least leap of a spike from row to row, part of its size; least size of a spike, part of its neighbours' range."""
 ROWS, LATE = 3, 3
-"""Over which a velocity is taken, before and after a spike; by which a torque's column may lie off."""
+"""Rows over which a velocity is computed before and after a spike; greatest delay of a torque's column, rows."""
 SEEN, SHARE = 90.0, 0.3
-"""Percentile of the changes of velocity that one must exceed to be seen, and the share of the torque that it explains,
-at least. Of 251 simulated logs of servo axes 50 had false spikes without these and `BACK`, and 2 with them;
-of five spikes put into each of them, five times as high as the signal, 99.6 and 99.0 % were found."""
+"""Percentile of the velocity's changes that a visible one must exceed; least share of the torque that it explains."""
 SEVERAL, MOST = 8, 0.67
-"""Of that which sticks out, and the part of them that is seen, from which on those drive the axis that move it alike,
-to `SHARE`: answers to steps of a reference, where play or a delay hides the inertia. With these and `ABRUPT` 17 of 419
-logs have 87 false spikes in the torque (30 had 650), and 98.9 % of 2140 put in are found (99.2)."""
+"""Number of candidates, and visible share of them, from which on those with a similar response, to `SHARE`, drive the
+axis: responses to steps of a reference, where play or a delay hides the inertia."""
 NAMED = 4
 
 
 def spikes(view: View) -> Iterator[Finding]:
-    """Rows that stick out of a signal."""
+    """Yield a warning on rows that stick out of a signal."""
     for channel in CHANNELS:
         if not view.has(channel) or (channel == "current" and view.from_current):
             continue
@@ -66,7 +63,7 @@ def spikes(view: View) -> Iterator[Finding]:
 
 
 def _size_of(values: Array, index: Any, unit: str) -> str:
-    """How many spikes there are, and how large beside what is usual; beside their neighbours where they are less."""
+    """Return the number of spikes as text, and their size relative to usual values, or else to their neighbours."""
     usual = float(np.percentile(np.abs(np.delete(values, index)), 98))
     largest = float(values[index[np.argmax(np.abs(values[index]))]])
     runs = np.split(index, np.flatnonzero(np.diff(index) > 1) + 1)
@@ -78,7 +75,7 @@ def _size_of(values: Array, index: Any, unit: str) -> str:
 
 
 def _away(values: Array, run: Any) -> float:
-    """How far a spike sticks out of the nearer one of the usable rows before and after it."""
+    """Return the distance of a spike from the nearer of the usable rows before and after it."""
     before, after = int(run[0]) - 1, int(run[-1]) + 1
     while before >= 0 and not math.isfinite(values[before]):
         before -= 1
@@ -89,7 +86,7 @@ def _away(values: Array, run: Any) -> float:
 
 
 def spike_rows(record: Record) -> Any:
-    """Numbers in the file of the rows that have a spike in any channel."""
+    """Return the file's row numbers with a spike in any channel."""
     view = View(record)
     index = np.flatnonzero(view.usable)
     found = [index[_spikes_of(view, channel)] for channel in CHANNELS if view.has(channel)]
@@ -97,7 +94,7 @@ def spike_rows(record: Record) -> Any:
 
 
 def _spikes_of(view: View, channel: str) -> Any:
-    """Usable rows of a channel's spikes: what sticks out, comes back to where it was and does not move the axis."""
+    """Return usable rows of a channel's spikes: they stick out, return to their level and do not move the axis."""
     values = view.values(channel)
     rows = sticking_out(values, position=channel == "position")
     if not rows.size:
@@ -109,7 +106,7 @@ def _spikes_of(view: View, channel: str) -> Any:
     out = np.array([values[r][np.argmax(np.abs(values[r] - at))] for r, at in zip(runs, level, strict=True)])
     size = np.abs(out - level)
     spike = np.abs(values[after] - values[before]) <= BACK * size
-    # What has mass comes and goes over several rows, and a peak of what rings is among others.
+    # Anything with mass rises and falls over several rows, and a peak of ringing is among others.
     leaps = np.abs(np.stack([values[first] - values[before], values[last] - values[after]]))
     spike &= np.min(leaps, axis=0) >= ABRUPT * size
     spike &= _beside(values, first, last) <= size / ABRUPT
@@ -122,14 +119,14 @@ def _spikes_of(view: View, channel: str) -> Any:
 
 
 def _beside(values: Array, first: Any, last: Any) -> Array:
-    """How far apart the rows beside each run are, `ROWS` on either side."""
+    """Return the range of the rows next to each run, `ROWS` on either side."""
     away = np.arange(1, ROWS + 1)
     rows = np.concatenate((first[:, None] - away, last[:, None] + away), axis=1)
     return np.asarray(np.ptp(values[np.clip(rows, 0, values.size - 1)], axis=1))
 
 
 def _travelled(view: View, first: Any, last: Any, size: Array) -> Any:
-    """Of runs of rows of the velocity, whether the position moves as much faster there; mask."""
+    """Return a mask of runs of the velocity in which the position moves faster by a similar amount."""
     rate = np.diff(view.values("position")) / np.diff(view.time)
     there = np.stack([rate[np.clip(k, 0, rate.size - 1)] for k in (first - 1, first, last - 1, last)])
     ends = np.stack([rate[np.clip(k, 0, rate.size - 1)] for k in (first - 2, last + 1)])
@@ -137,7 +134,7 @@ def _travelled(view: View, first: Any, last: Any, size: Array) -> Any:
 
 
 def _moving(view: View, torque: Array, first: Any, last: Any, sign: Array) -> Any:
-    """Of runs of rows, whether the torque that sticks out there is seen in the motion; mask."""
+    """Return a mask of runs of rows whose torque shows in the motion."""
     every = np.arange(torque.size)
     if view.has("position"):
         position = view.values("position")
@@ -149,24 +146,24 @@ def _moving(view: View, torque: Array, first: Any, last: Any, sign: Array) -> An
         return np.zeros(first.size, dtype=bool)
     usual, driven = _kick(position, every, every), np.cumsum(np.cumsum(torque - np.median(torque)))
     strong = np.abs(usual) >= max(float(np.percentile(np.abs(usual), 95)), 1e-300)
-    # The inertia in units of rows, from the rows that accelerate most.
+    # The inertia in units of rows, from the rows with the greatest acceleration.
     inertia = float(np.median(_kick(driven, every, every)[strong] / usual[strong])) if np.any(strong) else 0.0
     usually = float(np.percentile(np.abs(usual), SEEN))
     given = np.abs(_kick(driven, first, last))
-    # A column may lie rows beside the torque that acted.
+    # A column may be rows away from the torque that acted.
     shifts = range(-LATE, LATE + 1)
     late: Array = np.stack([_kick(position, first + k, last + k, sign) for k in shifts]).max(axis=0)
     kick, seen = _kick(position, first, last) * sign, late > usually
     if seen.size >= SEVERAL and float(np.mean(seen)) >= MOST:
-        # They tell the inertia that they move themselves: by what each adds to the torque beside it, since that may
-        # change across it as well, where the axis breaks loose.
+        # The moving candidates determine the inertia themselves: each by what it adds to the torque next to it, since
+        # that may change across it as well when the axis breaks away.
         added = _impulse(torque, first, last)
         return seen & (late / added >= SHARE * float(np.median(late[seen] / added[seen])))
     return (kick > usually) & (inertia * kick >= SHARE * given)
 
 
 def _impulse(torque: Array, first: Any, last: Any) -> Array:
-    """What runs of rows add to the mean of the rows beside each, summed up."""
+    """Return the sum that runs of rows add to the mean of their neighbouring rows."""
     beside = np.clip(np.stack([first - 1, last + 1]), 0, torque.size - 1)
     total = np.concatenate([[0.0], np.cumsum(torque)])
     added = total[last + 1] - total[first] - (last + 1 - first) * np.mean(torque[beside], axis=0)
@@ -174,8 +171,11 @@ def _impulse(torque: Array, first: Any, last: Any) -> Array:
 
 
 def _kick(position: Array, first: Any, last: Any, sign: Any = 0.0) -> Array:
-    """By how much the velocity changes across runs of rows, beyond what it changes beside them, per row; with a sign
-    to that side, and no more than it changes at all: beside a kick there is none to the other side."""
+    """Return the velocity's change across runs of rows beyond its change next to them, per row.
+
+    With a sign, it is the change towards that side, and at most the whole change: next to a kick there is none to the
+    other side.
+    """
 
     def way(begin: Any) -> Array:
         ends: Array = np.clip(np.stack([begin, begin + ROWS]), 0, position.size - 1)
@@ -188,7 +188,7 @@ def _kick(position: Array, first: Any, last: Any, sign: Any = 0.0) -> Array:
 
 
 def sticking_out(values: Array, *, position: bool) -> Any:
-    """Rows of spikes; none where there would be more than `FEW`."""
+    """Return the rows of spikes; none if there are more than `FEW`."""
     if values.size < 50:
         return np.empty(0, dtype=int)
     low, high = np.percentile(values, [2.0, 98.0])

@@ -1,4 +1,4 @@
-"""Check a table of steady points: rows of a constant velocity and the torque that keeps it, without times."""
+"""Check a table of steady points: rows of constant velocity and its torque, without times."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from stickslip.readers.cut import file_rows, range_words, taken
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 NOTES = "notes_on_rows"
-"""Key of a record's meta: what was left out of a table, in words."""
+"""Key of a record's meta: notes on the rows left out of a table."""
 MOST = 1000
 """Most rows of a table: each is a test at constant velocity, which takes seconds. More rows are a log without times."""
 ALIKE = 0.1
-"""Part of the torque by which that of both directions must differ for its sign to be certain."""
+"""Least relative difference of the torque between both directions for its sign to be certain."""
 
 
 def is_steady_table(record: Record) -> bool:
-    """Whether the rows of a record are steady points."""
+    """Return whether the rows of a record are steady points."""
     return bool(record.meta.get("reading", {}).get("steady_points", False))
 
 
@@ -73,7 +73,7 @@ def examine_table(record: Record) -> tuple[Record, list[Finding]]:
 
 
 def signs(velocity: Array, torque: Array) -> Iterator[Finding]:
-    """Yield an error if the torque of both directions cannot have the sign that friction has."""
+    """Yield an error if the torque's signs in both directions cannot be those of friction."""
     ahead, back = torque[velocity > 0.0], torque[velocity < 0.0]
     if not (ahead.size and back.size):
         return

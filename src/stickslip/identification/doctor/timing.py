@@ -1,4 +1,4 @@
-"""Time: backward, duplicate, with gaps, uneven, in another unit."""
+"""Defects of the time column: backward, duplicate, gaps, uneven steps, wrong unit."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from stickslip.core.messages import name_option
 from stickslip.identification.doctor.view import View, row
 
 GAP = 5.0
-"""A gap is this many times the usual distance of samples."""
+"""Ratio of a step to the median step from which on it is a gap."""
 FEWEST = 20
-"""Usable rows without which nothing can be said."""
+"""Fewest usable rows for any result."""
 SHORTEST = 1e-9
-"""s between two samples: no drive is faster, so that the unit must be another."""
+"""Shortest plausible sample period, s: no drive is faster, so the unit must be another."""
 FEW_MS = 100.0
-"""Of a unit that nobody states: samples so many apart are so many ms; farther apart, microseconds."""
+"""Greatest period of a plausible unit if none is stated: up to this number of ms; above it, microseconds."""
 UNEVEN, ROUNDED = 0.2, 1e-6
-"""A distance is uneven when it differs from the usual one by more than this share, and by more than rounding."""
+"""Relative deviation from the median step from which on a step is uneven; tolerance for rounding."""
 JITTER = 0.02
-"""Width of the middle 90 % of the distances, over their median."""
+"""Width of the middle 90 % of the steps over their median, above which there is jitter."""
 
 
 def ascending(view: View) -> Iterator[Finding]:
-    """Times that go back or stand still."""
+    """Yield errors on times that decrease or repeat."""
     time = view.record.time
     if view.has("event"):
-        return  # a simulation writes an event before and after its jump
+        return  # A simulation writes an event before and after its jump.
     known = np.flatnonzero(np.isfinite(time))
     steps = np.diff(time[known])
     back = known[1:][steps < 0.0]
@@ -73,14 +73,14 @@ def ascending(view: View) -> Iterator[Finding]:
 
 
 def sampling(view: View) -> Iterator[Finding]:
-    """Gaps, and uneven distances."""
+    """Yield findings on gaps and uneven steps."""
     time = view.time
     if time.size < FEWEST:
         message = f"the record has {time.size} usable rows"
         yield Finding("error", "too-short", message, remedy=f"give at least {FEWEST}")
         return
     rows = np.flatnonzero(view.usable)
-    # Where the user left rows out is no fault of the record.
+    # Rows that the user left out are not a defect of the record.
     as_logged = np.diff(np.cumsum(np.diff(view.file_rows, prepend=view.file_rows[0] - 1) > 1)[rows]) == 0
     steps, rows = np.diff(time)[as_logged], rows[:-1][as_logged]
     usual = view.period
@@ -128,12 +128,12 @@ def sampling(view: View) -> Iterator[Finding]:
 
 
 def finer(period: float) -> str:
-    """The unit in which samples so far apart, were it s, are those of a drive."""
+    """Return the unit in which sample steps of this size are plausible for a drive."""
     return "ms" if period < FEW_MS else "us" if period < 1e3 * FEW_MS else "ns"
 
 
 def scale(view: View) -> Iterator[Finding]:
-    """Milliseconds for seconds, and the reverse, by the sample interval."""
+    """Yield a finding if the sample period suggests milliseconds instead of seconds, or the reverse."""
     if view.time.size < 2:
         return
     period = view.period

@@ -1,4 +1,4 @@
-"""Units: what the numbers themselves say against the units they are taken to have."""
+"""Units: evidence in the numbers against the assumed units."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stickslip.identification.doctor.view import Array, View
 DEG, REV, RPM = math.pi / 180.0, 2.0 * math.pi, 2.0 * math.pi / 60.0
 POSITION = {"deg": DEG, "rev": REV, "mm": 1e-3, "um": 1e-6}
 STATED = re.compile(r"\[\s*([^\]]*[^\]\s\d][^\]]+?)\s*\]|(?i:\(\s*((?:user )?units?(?:/\w+)?)\s*\))")
-"""What a column's name states as its unit: not an axis' number or letter."""
+"""Unit stated in a column's name: not an axis' number or letter."""
 AMBIGUOUS: dict[str, str] = dict.fromkeys(
     ("1/s", "s-1", "1/sec"), "revolutions a second in some drives' tools and radians in others"
 )
@@ -26,20 +26,19 @@ VELOCITY = {"deg/s": DEG, "rpm": RPM, "rev/s": REV, "mm/s": 1e-3, "mm/min": 1e-3
 TIME = {"ms": 1e-3, "us": 1e-6}
 LINEAR_ONLY = ("mm", "um", "mm/s", "mm/min")
 FOLLOWS, MOVES_ALIKE, THAT_UNIT = 0.95, 5.0, 0.01
-"""Correlation with its reference from which on a position follows it; how many times as far, or as little, it may then
-go: a weak loop that holds a weight goes a third of the way; and how near that is to a unit's size: gears of 60 and 6
-are 5 % from degrees and revolutions."""
+"""Correlation from which on a position follows its reference; greatest ratio of their travels in the same unit, since a
+weak loop that holds a weight moves less; tolerance of a unit's ratio, below the 5 % between gear ratios and units."""
 BITS = (10, 25)
 FEW_PLACES = 200
-"""Different positions by which a grid is told from one nearly as fine: phases turn once and more over them."""
+"""Fewest different positions to distinguish a grid from one nearly as fine: phases turn once or more over them."""
 LEAST = (0.5, 2.5)
-"""Counts that the nearest two positions may be apart."""
+"""Least and greatest distance of the nearest two positions, counts."""
 ON_THE_GRID = 0.8
-"""Mean of the phases' unit vectors on a grid: 0.9 where a file rounds to half a count, 0 by chance."""
+"""Mean of the phases' unit vectors on a grid: higher if a file rounds to half a count, 0 by chance."""
 
 
 def assumed(view: View) -> Iterator[Finding]:
-    """Units that nobody states."""
+    """Yield findings on units that are not stated."""
     main = ("time", "position", "velocity", "motor_torque", "friction_torque", "current")
     quiet = [c for c in main if not view.stated(c)]
     for channel in list(quiet):
@@ -64,7 +63,7 @@ def assumed(view: View) -> Iterator[Finding]:
 
 
 def counted(view: View) -> Iterator[Finding]:
-    """Whole numbers where an angle or a length is expected: counts."""
+    """Yield a finding on whole numbers instead of an angle or a length: counts."""
     if in_counts(view):
         values = view.values("position")
         level = "warning" if view.stated("position") else "error"
@@ -82,7 +81,7 @@ def counted(view: View) -> Iterator[Finding]:
 
 
 def in_counts(view: View) -> bool:
-    """Whether every position is a whole number: what depends on its unit then has this one remedy."""
+    """Return whether every position is a whole number: findings on its unit then have this one remedy."""
     if not view.has("position"):
         return False
     values = view.values("position")
@@ -90,14 +89,17 @@ def in_counts(view: View) -> bool:
 
 
 def _more(view: View, number: str, value: str) -> str:
-    """The option of a number of the drive's, unless it is given."""
+    """Return the option of a drive parameter, unless it is given."""
     given = view.record.meta.get("reading", {}).get("drive", {})
     return "" if number in given else f" --{number.replace('_', '-')} {value}"
 
 
 def degrees(view: View) -> Iterator[Finding]:
-    """A resolution that divides 360 as an encoder does, and not a whole turn of 2 pi; or a reference of so many eighths
-    of 360. Where the file itself says rad, a warning."""
+    """Yield a finding if the position seems to be in degrees instead of rad.
+
+    Its resolution divides 360 as an encoder does, and not 2 pi, or its reference moves by multiples of 360 / 8. It is a
+    warning if the file states rad.
+    """
     if not view.has("position") or view.record.units["position"] != "rad":
         return
     level, step = "warning" if view.stated("position") else "error", view.step
@@ -119,7 +121,7 @@ def degrees(view: View) -> Iterator[Finding]:
 
 
 def turns(view: View) -> Iterator[Finding]:
-    """A resolution of 1/1024, 1/2048, ... of the unit: turns. Some drives have such a step in rad, so a warning."""
+    """Yield a warning on a resolution of 1/1024, 1/2048, ...: turns. Some drives have such a step in rad."""
     if not view.has("position") or view.record.units["position"] != "rad" or in_counts(view):
         return
     if counts := _binary_counts(view.values("position"), 1.0):
@@ -131,7 +133,7 @@ def turns(view: View) -> Iterator[Finding]:
 
 
 def reference_scale(view: View) -> Iterator[Finding]:
-    """A position that follows its reference, but many times as far: one of the two is in another unit."""
+    """Yield a finding if a position follows its reference at another scale: one of the two has another unit."""
     unit = view.record.units.get("position")
     if not unit or not view.has("position_reference") or view.record.units["position_reference"] != unit:
         return
@@ -140,7 +142,7 @@ def reference_scale(view: View) -> Iterator[Finding]:
     spread = both.std(axis=1) if both.shape[1] else np.zeros(2)
     if not np.min(spread) > 0.0:
         return
-    # Sizes first: absurd numbers overflow where they are squared.
+    # Normalise first: absurd numbers overflow when squared.
     away: Array = (both - both.mean(axis=1, keepdims=True)) / spread[:, None]
     alike: Array = away[0] * away[1]
     times = float(spread[0] / spread[1])
@@ -168,7 +170,7 @@ def reference_scale(view: View) -> Iterator[Finding]:
 
 
 def explained(ratio: float, view: View) -> list[tuple[str, str, str]]:
-    """Units that explain a ratio, fewest first: code, in words, remedy."""
+    """Return the units that explain a ratio, fewest changes first: code, description, remedy."""
     linear = view.record.units["position"] == "m"
     found: list[tuple[float, str, str, str]] = []
     options = itertools.product(
@@ -183,7 +185,7 @@ def explained(ratio: float, view: View) -> list[tuple[str, str, str]]:
             or any((u in LINEAR_ONLY) != linear for _, u in changed if u not in TIME)
         ):
             continue
-        # A unit that somebody states is wrong less often.
+        # A stated unit is wrong less often.
         cost = len(changed) + 0.5 * sum(view.stated(c) for c, _ in changed)
         says = " and ".join(f"{c} in {u}" for c, u in changed)
         remedy = " ".join(view.mapped(c, u) for c, u in changed)
@@ -192,7 +194,7 @@ def explained(ratio: float, view: View) -> list[tuple[str, str, str]]:
 
 
 def too_fast(view: View) -> Iterator[Finding]:
-    """Speeds and torques that no axis has."""
+    """Yield a finding on implausible speeds."""
     smooth = view.smooth
     if smooth is None or not view.has("position") or (in_counts(view) and not view.stated("position")):
         return
@@ -211,7 +213,7 @@ def too_fast(view: View) -> Iterator[Finding]:
 
 
 def torque_scale(view: View) -> Iterator[Finding]:
-    """Whole numbers or tenths of percent where a torque is expected, or a rated torque of which a share is."""
+    """Yield a finding on a torque that is a share of the rated torque: whole numbers or tenths of percent."""
     if not view.has("motor_torque") or view.stated("motor_torque") or "motor_torque" not in view.columns:
         return
     asked = f"{_more(view, 'rated_torque', 'TORQUE')}, or {view.mapped('motor_torque', view.effort)} if it is right"
@@ -238,14 +240,14 @@ def torque_scale(view: View) -> Iterator[Finding]:
 
 
 def _whole(values: Array) -> bool:
-    """Whether all of many different values are whole numbers."""
+    """Return whether all of many different values are whole numbers."""
     return bool(
         values.size and np.unique(values[:5000]).size > 5 and np.all(np.abs(values - np.round(values)) < 1e-6)
     )
 
 
 def _counts_of_encoder(count: float) -> bool:
-    """Whether a turn of so many steps is an encoder's: a power of two, or four times hundreds of lines."""
+    """Return whether this many steps per turn are an encoder's: a power of two, or four times hundreds of lines."""
     near = round(count)
     if near < 100 or abs(count - near) > 2e-4 * near:
         return False
@@ -253,8 +255,10 @@ def _counts_of_encoder(count: float) -> bool:
 
 
 def _binary_counts(values: Array, turn: float) -> int:
-    """Counts of an encoder, a power of two, of which every position is a whole number in a unit of which so many are a
-    `turn`; 0 where there are none. A file may round them, by less than half a count."""
+    """Return the counts per `turn` of an encoder, a power of two, that fit every position; 0 if none do.
+
+    A file may round the positions by less than half a count.
+    """
     places: Array = np.unique(values[np.isfinite(values)])
     size = float(np.max(np.abs(places), initial=0.0))
     apart = np.diff(places)
@@ -264,7 +268,7 @@ def _binary_counts(values: Array, turn: float) -> int:
     least = float(np.partition(apart, 2)[2])
     for bits in range(*BITS):
         step = turn / 2**bits
-        # What is stored as a float of 32 bits has steps of a power of two as well.
+        # 32-bit floats have steps of a power of two as well.
         told = step > 16.0 * float(np.spacing(np.float32(size)))
         if told and LEAST[0] * step < least < LEAST[1] * step and _on(places, step):
             return 2**bits
@@ -272,17 +276,17 @@ def _binary_counts(values: Array, turn: float) -> int:
 
 
 def _on(places: Array, step: float) -> bool:
-    """Whether positions lie on a grid of this step, wherever it begins: by how much its phases agree."""
+    """Return whether positions are on a grid of this step, with any offset: whether its phases agree."""
     phase: Array = 2.0 * math.pi * places / step
     return math.hypot(float(np.mean(np.cos(phase))), float(np.mean(np.sin(phase)))) > ON_THE_GRID
 
 
 def _eighths(way: float) -> bool:
-    """Whether a way is 45, 90, ... and nothing that a person would ask for in rad."""
+    """Return whether a travel is a multiple of 45 and not a plausible request in rad."""
     return round(way / 45.0) >= 1 and abs(way / 45.0 - round(way / 45.0)) < 1e-5
 
 
 def _decimal(step: float) -> bool:
-    """Whether a step is that of a number printed with few digits."""
+    """Return whether a step is that of a number printed with few digits."""
     exponent = math.floor(math.log10(step) + 1e-9)
     return abs(step / 10.0**exponent - 1.0) < 1e-6

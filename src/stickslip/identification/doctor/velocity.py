@@ -1,8 +1,8 @@
-"""The velocity's own column against the change of the position: its unit, its sign, and by how much it is late.
+"""The velocity's column against the derivative of the position: its unit, its sign and its delay.
 
-A column that is late or filtered differs from the position's change without a wrong unit, most of all where a short
-record has little more than the start of a motion. So both are compared away from the ends, where filters begin, and
-once more with the delay or the low-pass that explains the most.
+A delayed or filtered column differs from the position's derivative without a wrong unit, most of all in a short record
+that is mostly the start of a motion. Both are therefore compared away from the ends, where filters settle, and once
+more with the delay or the low-pass that explains the most.
 """
 
 from __future__ import annotations
@@ -20,49 +20,54 @@ from stickslip.identification.doctor.units import explained, in_counts
 from stickslip.identification.doctor.view import Array, View
 
 LATE, EXPLAINS = 1.0, 0.5
-"""Rows from which on a velocity is late: one that was differenced from row to row is half a row; and the share of its
-distance from the position's change that its lateness then explains."""
+"""Delay of a velocity that is reported, rows: a difference from row to row has half a row; least share of the mismatch
+that the delay explains."""
 LEAST = 1e-100
-"""Of speeds, over which, and under one over which, they are no numbers of an axis."""
+"""Least plausible speed; its inverse is the greatest."""
 LOOKS = 6
-"""At the velocity, each shifted by what the one before found."""
+"""Iterations of the delay, each from the result before."""
 EDGE, FEWEST, STEPS, MOST = 20, 20, 20.0, 0.5
-"""Rows at either end in which the filter of 4 rows still knows that the record ends; rows between that tell at least;
-steps of the encoder, and the part of its way, that the position must move there."""
+"""Rows at either end affected by the filter of 4 rows; fewest rows between them; least travel between them in steps of
+the encoder and as a part of all travel."""
 SAME = 1.25
-"""Times by which a velocity may be off in size: torque ripple and coarse counts make as much."""
+"""Ratio of a correct velocity's size to the derivative's: torque ripple and coarse counts cause as much."""
 BY_CHANCE = 2.0
-"""Standard deviations of a velocity's size, of so many counts, within which it may be right."""
+"""Standard deviations of a velocity's size due to its counts, within which it may be right."""
 ALIKE = 1.3
-"""Times that the sizes in both halves of the motion may be apart for one unit to explain them."""
+"""Greatest ratio of the sizes in both halves of the motion for one unit to explain them."""
 FOLLOWS, LONG = 0.6, 500
-"""Correlation with the position's change above which a velocity follows it; and rows that tell that it does not."""
+"""Correlation with the position's derivative above which a velocity follows it; fewest rows to show that it does
+not."""
 DEPARTS, INTEGRATES = 0.02, 0.5
-"""Part of the distance by which the position departs from a constant speed at least, to compare it with the integral of
-the velocity; and the squared correlation of both from which on the velocity belongs to the position."""
+"""Least departure of the position from a constant speed, part of the travel, to compare it with the integral of the
+velocity; squared correlation of both above which the velocity belongs to the position."""
 
 
 class Size(NamedTuple):
-    """Size of the column in that of the position's change: noise in the latter takes from `least`, noise in the column
-    adds to `most`."""
+    """Size of the column relative to the position's derivative.
+
+    Noise in the derivative lowers `least`, noise in the column raises `most`.
+    """
 
     least: float
     most: float
 
     @property
     def middle(self) -> float:
-        """Geometric mean of both."""
+        """Geometric mean of both bounds."""
         return math.sqrt(abs(self.least * self.most))
 
     @property
     def right(self) -> bool:
-        """Whether both may be in the same unit."""
+        """Whether both may have the same unit."""
         return self.least < SAME and self.most > 1.0 / SAME
 
 
 class Late(NamedTuple):
-    """By how much a velocity is late, s; its size beside that; the part of it that is left; and whether that is less by
-    `EXPLAINS` than what is left as it is."""
+    """Delay of a velocity, s, with its relative size.
+
+    `left` is the residual part; `explains` is whether the delay lowers it to `EXPLAINS` or less.
+    """
 
     time: float
     size: Size
@@ -72,7 +77,7 @@ class Late(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """The velocity's column and the position's change, filtered alike, away from the ends of the record.
+    """The velocity's column and the position's derivative, filtered alike, away from the ends of the record.
 
     Attributes
     ----------
@@ -81,8 +86,8 @@ class Compared:
     given, velocity, acceleration : array, shape (n,)
         In SI units: the column, and the position's derivatives.
     counts : float
-        Of the encoder of which the column was made at most, where it is their differences: each was there by chance, in
-        a row that was logged.
+        Greatest number of encoder counts behind the column, if it is their differences: each falls into a row by
+        chance.
     """
 
     period: float
@@ -93,21 +98,21 @@ class Compared:
 
     @property
     def correlation(self) -> float:
-        """Of both."""
+        """Correlation of both."""
         size = math.sqrt(float(np.mean(self.given**2) * np.mean(self.velocity**2)))
         return float(np.mean(self.given * self.velocity)) / size
 
     @property
     def size(self) -> float:
-        """Root mean square of the column over that of the position's change."""
+        """Root mean square of the column over that of the position's derivative."""
         return math.sqrt(float(np.mean(self.given**2) / np.mean(self.velocity**2)))
 
     @property
     def integrates(self) -> bool:
-        """Whether the column's integral explains most of how the position departs from a constant speed.
+        """Whether the column's integral explains most of the position's departure from a constant speed.
 
-        Noise, a delay and a filter, which change the velocity, hardly change its integral. True if the position departs
-        too little to tell.
+        Noise, a delay and a filter change the velocity but hardly its integral. True if the position departs too little
+        to decide.
         """
         times = np.linspace(-1.0, 1.0, self.given.size)
         travel, integral = (np.cumsum(x) * self.period for x in (self.velocity, self.given))
@@ -123,7 +128,7 @@ class Compared:
 
     @property
     def alike(self) -> bool:
-        """Whether both halves of the motion have about the same size."""
+        """Whether both halves of the motion have about the same relative size."""
         work: Array = np.cumsum(self.velocity**2)
         half = int(np.count_nonzero(work < 0.5 * float(work[-1])))
         sizes = [
@@ -135,8 +140,10 @@ class Compared:
 
     @property
     def sizes(self) -> list[Size]:
-        """Of the column in that of the position's change, beside the delay or the low-pass that explains the most, and
-        beside the other one where it explains as much; as they are where neither explains it."""
+        """Relative sizes with the delay or the low-pass that explains the most.
+
+        Both if they explain as much; without either if neither does.
+        """
         found = [late for late in (lateness(self), filtered(self)) if late.explains]
         smallest = min((late.left for late in found), default=0.0)
         told = [late.size for late in found if late.left <= smallest / EXPLAINS]
@@ -145,13 +152,13 @@ class Compared:
 
     @property
     def as_they_are(self) -> Size:
-        """Of the column in that of the position's change, beside nothing."""
+        """Size of the column relative to the position's derivative, without a delay."""
         follows = self.correlation if abs(self.correlation) > LEAST else LEAST
         return Size(self.size * follows, self.size / follows)
 
 
 def compared(view: View) -> Compared | None:
-    """Both velocities; None where there are not both, or the record is too short or too coarse to compare them."""
+    """Return both velocities; None if one is missing, or the record is too short or too coarse to compare them."""
     smooth = view.smooth
     if smooth is None or not (view.has("position") and view.has("velocity")) or smooth.fast <= 0.0:
         return None
@@ -170,15 +177,15 @@ def compared(view: View) -> Compared | None:
 
 
 def least(values: Array) -> float:
-    """The smallest size of any that is not 0; 0 where all are."""
+    """Return the smallest nonzero magnitude; 0 if all values are 0."""
     sizes = np.abs(values[values != 0.0])
     return float(np.min(sizes)) if sizes.size else 0.0
 
 
 def lateness(both: Compared) -> Late:
-    """The delay that explains the most.
+    """Return the delay that explains the most.
 
-    Least squares of given = c (v(t) - late dv/dt), about the time that the look before has found.
+    Least squares of given = c (v(t) - late dv/dt), about the delay of the iteration before.
     """
     given, period = both.given, both.period
     sizes = [float(np.sqrt(np.mean(x**2))) for x in (both.velocity, both.acceleration)]
@@ -203,7 +210,7 @@ def lateness(both: Compared) -> Late:
 
 
 def filtered(both: Compared) -> Late:
-    """The low-pass of first order that explains the most, its time constant as the delay.
+    """Return the first-order low-pass that explains the most, its time constant as the delay.
 
     Least squares of v = (given + late d given/dt) / c.
     """
@@ -223,7 +230,7 @@ def filtered(both: Compared) -> Late:
 
 
 def velocity_late(view: View) -> Iterator[Finding]:
-    """A velocity that a filter delays, or that is of an older row than its position."""
+    """Yield a note on a velocity that is filtered, or logged for another row than its position."""
     both = compared(view)
     if both is None:
         return
@@ -248,7 +255,7 @@ def velocity_late(view: View) -> Iterator[Finding]:
 
 
 def velocity_scale(view: View) -> Iterator[Finding]:
-    """The velocity against the derivative of the position: another unit, another sign."""
+    """Yield an error if the velocity differs from the position's derivative in unit or sign."""
     both = compared(view)
     if both is None or (in_counts(view) and not view.stated("position")):
         return
@@ -280,7 +287,7 @@ def velocity_scale(view: View) -> Iterator[Finding]:
 
 
 def _another_unit(size: float, view: View) -> Finding:
-    """Of a velocity of another size than the position's change: which units explain it."""
+    """Return the finding on a velocity of another size than the position's derivative, with units that explain it."""
     message = (
         f"velocity is {size:.4g} times the change of position per second, where both are taken in SI"
         f" ({view.record.units['velocity']})"

@@ -1,4 +1,4 @@
-"""What the checks look at: the usable rows of a record, on an even grid, filtered without phase."""
+"""The common view of all checks: the usable rows of a record, on an even grid, filtered without phase shift."""
 
 from __future__ import annotations
 
@@ -24,22 +24,24 @@ Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 MAIN = ("position", "velocity", "motor_torque", "friction_torque", "current")
 BUILDS_UP = 0.3
-"""Of a stroke, behind its reversal, in which friction may build up: pre-sliding, play, a load that is wound up. In
-three slow sines it was a tenth; behind it what a torque once a turn explained was a thousandth of what it had been."""
+"""Part of a stroke after its reversal in which friction may build up: pre-sliding, play, a load that is wound up."""
 MOVES, MOST_TRAVEL = 0.05, 0.95
-"""Part of the usual speed of a direction above which the axis moves in it; and the part of the travel in a direction
-below whose speed that much of it is travelled."""
+"""Part of a direction's usual speed above which the axis moves in it; part of the travel that is made below the usual
+speed."""
 BOTH_WAYS, NEVER = 0.05, 1e-3
-"""Parts of the travel in one direction: from which on the travel in the other is motion in its own right (a test that
-creeps forward and runs back), and below which it is what a stop swings back."""
+"""Parts of the travel in one direction: above the first, travel in the other is genuine motion (a test that creeps
+forward and runs back); below the second, it is the rebound of a stop."""
 MAX_ROWS = 200_000
-"""Rows of the even grid: longer records are looked at more coarsely."""
+"""Most rows of the even grid: longer records are resampled more coarsely."""
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """How a channel was read: the column in the file, whether anybody states its unit, whether its name says that it
-    is a command, and whether a profile says the unit."""
+    """How a channel was read.
+
+    The column in the file, its unit and whether it is stated, whether the name indicates a command, and whether a
+    profile sets the unit.
+    """
 
     name: str
     unit: str
@@ -55,9 +57,9 @@ class Smooth:
     Attributes
     ----------
     period : float
-        s
+        Sample period, s.
     position, velocity, acceleration, torque : array, shape (n,)
-        Zero-phase filtered alike; torque is empty where the record has none.
+        Zero-phase filtered alike; torque is empty if the record has none.
     """
 
     period: float
@@ -86,7 +88,7 @@ class Smooth:
 
     @cached_property
     def moving(self) -> Mask:
-        """Rows in which the axis moves: faster than `MOVES` of `fast`, or of the usual speed of a slower direction."""
+        """Mask of moving rows: faster than `MOVES` of `fast`, or of the usual speed of a slower direction."""
         v = self.velocity
         if min(self.travel) < BOTH_WAYS * max(self.travel):
             return np.asarray(np.abs(v) > MOVES * self.fast)
@@ -95,14 +97,14 @@ class Smooth:
 
     @cached_property
     def standstill(self) -> float:
-        """Rows that the axis usually does not move for, before it moves again; 0 where it always does."""
+        """Usual length of a standstill, rows; 0 without standstills."""
         turns = np.flatnonzero(np.diff(self.moving))
         stops = turns[np.argmax(self.moving[turns]) :] if turns.size else turns
         return float(np.median(np.diff(stops)[::2])) if stops.size > 1 else 0.0
 
     @cached_property
     def gone_on(self) -> Mask:
-        """Where the axis has gone `BUILDS_UP` of its stroke since it turned, mask."""
+        """Mask of rows after `BUILDS_UP` of their stroke."""
         first = np.flatnonzero(np.diff(np.sign(self.velocity), prepend=0.0) != 0.0)
         last = np.append(first[1:], self.velocity.size) - 1
         stroke = np.repeat(np.arange(first.size), last - first + 1)
@@ -113,12 +115,12 @@ class Smooth:
 
 
 def is_number(values: Array) -> Mask:
-    """Where values are finite, and not so large that their square overflows; mask."""
+    """Return a mask of values that are finite and whose square does not overflow."""
     return np.asarray(np.abs(np.nan_to_num(values, nan=np.inf)) < 1e100)
 
 
 class View:
-    """A record as the checks see it."""
+    """A record with the derived data that the checks use."""
 
     def __init__(self, record: Record, estimate: EstimateSliding = estimate_sliding) -> None:
         self.record, self.estimate = record, estimate
@@ -140,25 +142,25 @@ class View:
 
     @property
     def unused_drives(self) -> list[str]:
-        """Columns that no channel is made of, with a unit of torque, force, current or a share."""
+        """Unused columns with a unit of torque, force, current or a share."""
         return list(self.record.meta.get("reading", {}).get("drives", []))
 
     def stated(self, channel: str) -> bool:
-        """Whether anybody states the channel's unit."""
+        """Return whether the channel's unit is stated."""
         return self.columns[channel].stated if channel in self.columns else True
 
     def commanded(self, channel: str) -> bool:
-        """Whether the column's name says that it is a command."""
+        """Return whether the column's name indicates a command."""
         if channel == "motor_torque" and self.from_current:
             channel = "current"
         return channel in self.columns and self.columns[channel].commanded
 
     def name(self, channel: str) -> str:
-        """The channel's column in the file, for a remedy."""
+        """Return the channel's column in the file, for a remedy."""
         return self.columns[channel].name if channel in self.columns else channel
 
     def mapped(self, channel: str, unit: str) -> str:
-        """The option that reads the channel in another unit; "-" turns the sign of the present one."""
+        """Return the option that reads the channel in another unit; "-" inverts the present sign."""
         # A torque that was computed from the current has no column of its own.
         if channel == "motor_torque" and self.from_current:
             channel = "current"
@@ -169,7 +171,7 @@ class View:
 
     @property
     def from_current(self) -> bool:
-        """Whether the motor's torque was computed from the current: what one shows the other does, too."""
+        """Whether the motor's torque was computed from the current: findings on one apply to the other."""
         return self.has("motor_torque") and "motor_torque" not in self.columns and "current" in self.columns
 
     @cached_property
@@ -178,28 +180,28 @@ class View:
         return file_rows(self.record)
 
     def has(self, channel: str) -> bool:
-        """Whether the record has the channel."""
+        """Return whether the record has the channel."""
         return channel in self.record.channels
 
     @property
     def linear(self) -> bool:
-        """Whether the axis moves along a line."""
+        """Whether the axis is linear."""
         units = self.record.units
         return (units.get("position") or units.get("velocity", "")) in ("m", "m/s")
 
     @property
     def effort(self) -> str:
-        """The unit of what drives the axis, as `--map` takes it."""
+        """The unit of the drive's torque or force, as `--map` accepts it."""
         return "N" if self.linear else "Nm"
 
     @cached_property
     def torque_channel(self) -> str:
-        """What drives the axis: the motor's torque, a measured friction, or nothing."""
+        """Channel that drives the axis: the motor's torque, a measured friction, or ""."""
         return next((c for c in ("motor_torque", "friction_torque") if self.has(c)), "")
 
     @cached_property
     def usable(self) -> Any:
-        """Rows whose time ascends and whose main channels are numbers, mask."""
+        """Mask of rows whose times increase and whose main channels are finite."""
         time = self.record.time
         good = is_number(time)
         for channel in MAIN:
@@ -217,22 +219,22 @@ class View:
         return self.record.time[self.usable]
 
     def values(self, channel: str) -> Array:
-        """Usable values of a channel."""
+        """Return usable values of a channel."""
         return self.record[channel][self.usable]
 
     @cached_property
     def period(self) -> float:
-        """The usual distance of two samples, s."""
+        """Median sample period, s."""
         return float(np.median(np.diff(self.time))) if self.time.size > 1 else math.nan
 
     @cached_property
     def step(self) -> float:
-        """The step of the position's encoder, in the position's unit; 0 where there is none."""
+        """The step of the position's encoder, in the position's unit; 0 if there is none."""
         return encoder_step(self.values("position")) if self.has("position") else 0.0
 
     @cached_property
     def sliding(self) -> SlidingPosterior | None:
-        """What gross sliding says; None where the record has none, or no position and torque of a motor."""
+        """Estimate from gross sliding; None without gross sliding, or without the position and torque of a motor."""
         if self.torque_channel != "motor_torque" or not self.has("position"):
             return None
         motion = "linear" if self.linear else "rotary"
@@ -247,7 +249,7 @@ class View:
 
     @cached_property
     def smooth(self) -> Smooth | None:
-        """Filtered signals; None where there is too little to filter."""
+        """Filtered signals; None if there are too few samples to filter."""
         if self.time.size < 30 or not (self.has("position") or self.has("velocity")):
             return None
         span = float(self.time[-1] - self.time[0])
@@ -269,11 +271,11 @@ class View:
 
     @cached_property
     def given_velocity(self) -> Array:
-        """The velocity's own column, filtered as `smooth` is; of short steps the filter takes half."""
+        """The velocity's own column, filtered as in `smooth`, which halves short steps."""
         return self.filtered("velocity", self.smooth.velocity.size if self.smooth else 0)
 
     def filtered(self, channel: str, count: int) -> Array:
-        """A channel at so many even times, zero-phase filtered, shape (count,)."""
+        """Return a channel at `count` even times, zero-phase filtered, shape (count,)."""
         grid = np.linspace(float(self.time[0]), float(self.time[-1]), count)
         raw = np.interp(grid, self.time, self.values(channel))
         begin = raw[0] if channel == "position" else 0.0
@@ -281,7 +283,7 @@ class View:
 
 
 def row(index: int, view: View) -> str:
-    """Where a row of the record is: its number in the file, from 1, and its time if that is known."""
+    """Return a row's number in the file, from 1, and its time if that is known."""
     number = view.file_rows[index]
     if math.isfinite(view.record.time[index]):
         return f"row {number}, t = {view.record.time[index]:.6g} s"

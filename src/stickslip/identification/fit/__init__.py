@@ -1,1 +1,1 @@
-"""Least squares, noise, intervals, filters: the mathematics that the methods share."""
+"""Mathematics that the methods share: least squares, noise, intervals, filters."""

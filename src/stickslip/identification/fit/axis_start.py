@@ -1,8 +1,8 @@
-"""Where the search for a law's parameters starts, for any law: its example, carried over to this axis.
+"""Starting values of a law's parameters, for any law: its example, scaled to the axis.
 
-A law's parameters are powers of torque, length and time; the example that every law brings is scaled by the torque,
-velocity and pre-sliding length of this axis (dimensional analysis), and its steady torque is then fitted to the
-friction curve that the inverse dynamics found. Nothing here knows a parameter by name.
+A law's parameters are powers of torque, length and time; the example of every law is scaled by the torque, velocity and
+pre-sliding length of the axis (dimensional analysis), and its steady torque is then fitted to the friction curve of the
+inverse dynamics. No parameter is known by name here.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from stickslip.simulation.prescribed.steady import Steady
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
-LENGTHS = (1e-5, 1e-4, 1e-3)  # of the travel: pre-sliding lengths that are tried
-VELOCITIES = (0.03, 0.15)  # of the usual speed: Stribeck velocities that are tried
-ELEMENTS = 2  # of a law with elements; a record rarely determines more, and starting values may give more
-TIE = 0.3  # how strongly the steady fit holds on to the scaled example, in coordinates per relative torque
-NEARLY = 1e-4  # relative decrease of the sum of squares at which it ends: a search goes on from there
+LENGTHS = (1e-5, 1e-4, 1e-3)  # pre-sliding lengths that are tried, part of the travel
+VELOCITIES = (0.03, 0.15)  # Stribeck velocities that are tried, part of the usual speed
+ELEMENTS = 2  # elements of a law; a record rarely determines more, and starting values may give more
+TIE = 0.3  # weight of the scaled example in the steady fit, in coordinates per relative torque
+NEARLY = 1e-4  # relative decrease of the sum of squares at which it stops: a search continues from there
 
 
 def dimensions(unit: str) -> tuple[int, int, int]:
-    """Powers of torque, length and time in a unit: ``N·m·s/rad`` is (1, -1, 1).
+    """Return the powers of torque, length and time in a unit: ``N·m·s/rad`` is (1, -1, 1).
 
     Raises
     ------
@@ -57,7 +57,7 @@ def dimensions(unit: str) -> tuple[int, int, int]:
 
 
 def scaled(law: Law, torque: float, length: float, velocity: float) -> dict[str, Any]:
-    """The law's example with its units of torque, length and velocity multiplied by these factors."""
+    """Return the law's example with its units of torque, length and velocity multiplied by these factors."""
     time = length / velocity
     values: dict[str, Any] = {}
     for f in law.fields:
@@ -79,7 +79,7 @@ def scaled(law: Law, torque: float, length: float, velocity: float) -> dict[str,
 
 
 def fewer(f: Field, values: list[float]) -> list[float]:
-    """The first elements; their shares add up to 1, and the torques they carry to as much as all did."""
+    """Return the first elements, scaled so that shares add up to 1, or torques to the same total."""
     kept = values[:ELEMENTS]
     if not (f.par.shares or (f.par.per == "element" and f.par.unit == "N·m")):
         return kept
@@ -88,7 +88,7 @@ def fewer(f: Field, values: list[float]) -> list[float]:
 
 
 def frozen_by_default(law: Law) -> list[str]:
-    """What stays at its value unless it is freed by name: shape factors that have a default, and shares (equal)."""
+    """Return the parameters that are frozen unless freed by name: shape factors with a default, and equal shares."""
     return [
         f.name for f in law.fields
         if f.par.shares or (f.par.default is not None and f.par.unit == "-" and not f.per_element)
@@ -96,10 +96,10 @@ def frozen_by_default(law: Law) -> list[str]:
 
 
 def feasible(law: Law, p: Any) -> Any | None:
-    """These parameters, or the nearest that the law accepts; None where none is known.
+    """Return these parameters, or the nearest that the law accepts; None if none is known.
 
     A static torque below the Coulomb torque is raised to it: the curve without a Stribeck effect. Limits of elements
-    that together stay below the static torque (Leuven) are raised to it in proportion.
+    whose sum is below the static torque (Leuven) are raised to it in proportion.
     """
     if law.check is None or not law.check(p):
         return p
@@ -115,23 +115,23 @@ def feasible(law: Law, p: Any) -> Any | None:
 def starts(
     law: Law, coulomb: float, viscous: float, speed: float, travel: float, known: dict[str, Any]
 ) -> list[Model]:
-    """Models to start from: the example on this axis's scales, fitted to its friction curve.
+    """Return starting models: the example on the axis's scales, fitted to its friction curve.
 
     Parameters
     ----------
     law : Law
     coulomb, viscous : float
-        The friction curve that the inverse dynamics found, N·m and N·m·s/rad.
+        Friction curve of the inverse dynamics, N·m and N·m·s/rad.
     speed, travel : float
         Usual (RMS) speed and range of the position, rad/s and rad.
     known : mapping
-        Values that the user gave; they stay.
+        Values given by the user, which are kept.
     """
     example = law.parameters(dict(law.example))
     own_velocity = law.velocity_scale(example) if law.velocity_scale else 0.01
     own_torque = level_of(law, example, own_velocity)
     own_length = length_of(law, example, own_torque)
-    # Faster than the Stribeck velocities that are tried, so that what lies below them keeps the example's shape.
+    # Faster than the Stribeck velocities that are tried, to keep the example's shape below them.
     v = speed * np.array([-3.0, -2.0, -1.4, -1.0, -0.7, -0.5, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0])
     curve = np.sign(v) * coulomb + viscous * v
     out, fits = list[Model](), dict[Any, dict[str, float]]()
@@ -157,9 +157,9 @@ def starts(
 
 
 def viscous_ones(model: Model, viscous: float, v: float) -> dict[str, float]:
-    """The parameters that are slopes of the steady torque over the velocity, and the slope that was found; none for 0.
+    """Return the parameters that are slopes of the steady torque over velocity, set to `viscous`; none for 0.
 
-    Left to the fit of the curve, a Stribeck effect that rises would take the slope over.
+    In the fit of the curve, a rising Stribeck effect could otherwise replace the slope.
     """
     law, p, out = model.law, model.parameters, dict[str, float]()
     for f in law.fields:
@@ -174,7 +174,7 @@ def viscous_ones(model: Model, viscous: float, v: float) -> dict[str, float]:
 
 
 def level_of(law: Law, p: Any, velocity: float) -> float:
-    """The torque at a slow steady motion, N·m."""
+    """Return the torque in slow steady motion, N·m."""
     if law.steady is not None:
         torque = abs(law.steady(3.0 * velocity, p))
     else:
@@ -188,13 +188,13 @@ def level_of(law: Law, p: Any, velocity: float) -> float:
 
 
 def length_of(law: Law, p: Any, torque: float) -> float:
-    """The displacement over which torque builds up from rest, rad: torque over the stiffness at rest."""
+    """Return the displacement over which torque builds up from rest, rad: torque over the stiffness at rest."""
     stiffness = stiffness_at_rest(law, p)
     return torque / stiffness if stiffness > 0.0 else 1e-5
 
 
 def steady_fits(models: Sequence[Model], v: Array, curve: Array, held: Sequence[str]) -> list[Model]:
-    """`steady_fit` of models of one law."""
+    """Return `steady_fit` of several models of one law."""
     fits: dict[Any, dict[str, float]] = {}
     return [steady_fit(model, v, curve, held, fits) for model in models]
 
@@ -202,9 +202,10 @@ def steady_fits(models: Sequence[Model], v: Array, curve: Array, held: Sequence[
 def steady_fit(
     model: Model, v: Array, curve: Array, held: Sequence[str], fits: dict[Any, dict[str, float]]
 ) -> Model:
-    """The model with its steady torque fitted to a curve; what the curve does not tell stays as it was.
+    """Return the model with its steady torque fitted to a curve; parameters without influence on it are kept.
 
-    ``fits`` are those of the same law to the same curve: models that differ in what it does not tell share one.
+    ``fits`` are those of the same law to the same curve: models that differ only in parameters without influence share
+    one.
     """
     names = told_by(model, v, held)
     start = tuple(getattr(model.parameters, name) for name in names)
@@ -215,7 +216,7 @@ def steady_fit(
 
 
 def told_by(model: Model, v: Array, held: Sequence[str]) -> tuple[str, ...]:
-    """The parameters that the steady torque at these velocities depends on, but for those that are held."""
+    """Return the parameters that influence the steady torque at these velocities, except those held."""
     law, p = model.law, model.parameters
     if law.steady is None:
         return ()
@@ -232,7 +233,7 @@ def told_by(model: Model, v: Array, held: Sequence[str]) -> tuple[str, ...]:
 
 
 def steady_values(model: Model, v: Array, curve: Array, names: Sequence[str]) -> dict[str, float]:
-    """These parameters, fitted so that the steady torque follows the curve."""
+    """Return these parameters fitted to make the steady torque follow the curve."""
     law = model.law
     vector = Vector(model, frozen=[f.name for f in law.fields if f.name not in names])
     first, size, steady = vector.start, float(np.max(np.abs(curve))), Steady(law, v, np.sign(v))
@@ -252,7 +253,7 @@ def steady_values(model: Model, v: Array, curve: Array, names: Sequence[str]) ->
 
 
 def dimensions_of(unit: str) -> tuple[int, int, int] | None:
-    """As `dimensions`; None for a unit that it does not read."""
+    """Return `dimensions` of a unit; None if the unit cannot be read."""
     try:
         return dimensions(unit)
     except InputError:
@@ -260,6 +261,6 @@ def dimensions_of(unit: str) -> tuple[int, int, int] | None:
 
 
 def each_way(law: Law) -> Law:
-    """The law with parameters of its own for v < 0, where it may have them."""
+    """Return the law with separate parameters for v < 0, if it allows them."""
     known = {choice.name for choice in law.choices}
     return law.having(symmetry="asymmetric") if "symmetry" in known else law

@@ -1,6 +1,6 @@
-"""Least squares where an evaluation is dear: Levenberg and Marquardt's method on a Jacobian kept by secants.
+"""Least squares for expensive evaluations: the Levenberg-Marquardt method with a Jacobian updated by secants.
 
-Broyden's update (``broyden1965``) in the scale of the coordinates, differences anew only where it no longer leads
+Broyden's update (``broyden1965``) in the scale of the coordinates; new differences only if the Jacobian no longer leads
 downhill (``madsen2004``, section 3.4). For fits of simulations: a step costs one of them, not 2 p + 1.
 """
 
@@ -19,17 +19,17 @@ from stickslip.identification.fit.parallel import mapped
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TRIES = 2
-"""Damped steps that may fail on a Jacobian kept by secants before it is taken anew."""
+"""Failed damped steps on an updated Jacobian after which it is recomputed."""
 
 WIDTH, NARROWEST = 3.0, 1e-3
-"""Differences are as wide as changes the residuals by so many of their root mean squares in all, so that what is
-rough below that does not matter; and at least this part of the widest."""
+"""Width of differences: the residuals change by this multiple of their root mean square, above their roughness; least
+part of the widest."""
 LONGEST = 0.5
-"""Change of a coordinate in one step: beyond a factor of 1.6 a linear model of a simulation says little."""
+"""Largest change of a coordinate in one step: beyond a factor of 1.6 a linear model of a simulation is inaccurate."""
 
 
 def forward_differences(squares: Squares, u: Array, r: Array, widths: Array) -> Array:
-    """Jacobian at u, where the residuals are r, by one-sided differences inside the bounds, shape (n, p)."""
+    """Return the Jacobian at u, with residuals r, by one-sided differences inside the bounds, shape (n, p)."""
 
     def column(i: int) -> Array:
         there = u.copy()
@@ -50,20 +50,20 @@ def descend_by_secants(
     evaluations: int = 200,
     tolerance: float = 1e-6,
 ) -> tuple[Array, float]:
-    """The minimum that is reached from `start`, as far as the tolerance asks.
+    """Find the minimum reached from `start`, to the tolerance.
 
     Parameters
     ----------
     squares : Squares
-        Its differences are those of the first Jacobian; later ones are narrower where that tells enough.
+        Its differences are those of the first Jacobian; later ones are narrower if the residuals allow it.
     start : array, shape (p,)
         Moved inside the bounds.
     held : sequence of int
-        Coordinates that stay.
+        Coordinates that are held fixed.
     evaluations : int
-        About how many calls of the residuals at most.
+        Approximate limit on calls of the residuals.
     tolerance : float
-        Relative decrease of the sum of squares below which it ends, on a fresh Jacobian.
+        Relative decrease of the sum of squares below which it stops, with a fresh Jacobian.
 
     Returns
     -------
@@ -81,11 +81,11 @@ def descend_by_secants(
 
 
 class Secants:
-    """The state of a descent: where it stands, and the Jacobian it believes in."""
+    """The state of a descent: the present point and its approximate Jacobian."""
 
     def __init__(self, squares: Squares, start: Array, held: Sequence[int] = ()) -> None:
         self.here = squares.begin(start)
-        # A coordinate is held by bounds that leave it no room.
+        # A coordinate is held by equal bounds.
         stays = np.isin(np.arange(self.u.size), list(held))
         self.squares = replace(
             squares,
@@ -99,21 +99,21 @@ class Secants:
 
     @property
     def u(self) -> Array:
-        """The coordinates where it stands, shape (p,)."""
+        """The present coordinates, shape (p,)."""
         return self.here.u
 
     @property
     def cost(self) -> float:
-        """The sum of squares there."""
+        """The present sum of squares."""
         return self.here.cost
 
     def run(self, evaluations: int, tolerance: float) -> None:
-        """Go on until so many residuals were called in all, or nothing is gained any more."""
+        """Continue until the residuals were called this often in all, or the decrease is below the tolerance."""
         while self.spent < evaluations and self.step(tolerance):
             pass
 
     def step(self, tolerance: float) -> bool:
-        """Go one step; False where one on differences taken at its begin gains too little to go on."""
+        """Take one step; return False if a step with fresh differences decreases too little."""
         if not self.scale.any():
             self.refresh()
         sure = self.fresh
@@ -125,7 +125,7 @@ class Secants:
         return True
 
     def refresh(self) -> None:
-        """Take the Jacobian anew."""
+        """Recompute the Jacobian."""
         here = self.here
         widths = self.squares.difference * np.maximum(1.0, np.abs(here.u))
         if self.scale.any():
@@ -136,7 +136,7 @@ class Secants:
         self.scale = np.maximum(self.scale, np.linalg.norm(self.jacobian, axis=0))
 
     def gain(self, tolerance: float) -> float:
-        """Step downhill where the Jacobian leads there; by how much the sum of squares fell."""
+        """Take a downhill step if the Jacobian provides one; return the decrease of the sum of squares."""
         here, r = self.here, self.here.residuals
         pull = self.jacobian.T @ r
         blocked = ((pull > 0.0) & (here.u <= self.squares.lower)) | (
@@ -151,7 +151,7 @@ class Secants:
         gain = here.cost - there.cost
         if gain <= 0.0:
             return 0.0
-        # What was seen on the way corrects the Jacobian in that direction.
+        # The observed change corrects the Jacobian in that direction.
         moved = there.u - here.u
         weighted = self.scale**2 * moved
         if (size := float(weighted @ moved)) > 0.0:

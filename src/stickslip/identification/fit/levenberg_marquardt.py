@@ -1,7 +1,7 @@
-"""Least squares to the last digit, and the global minimum: Levenberg and Marquardt's method from many starts.
+"""Least squares to full precision, and the global minimum: the Levenberg-Marquardt method from many starts.
 
-Moré's (1978) scaling; every trial step comes from one singular value decomposition of the Jacobian, so that the
-normal equations, which would square its condition, are never formed. Bounds are kept by projection.
+With Moré's (1978) scaling; every trial step comes from one singular value decomposition of the Jacobian, without the
+normal equations, which would square its condition number. Bounds are enforced by projection.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from stickslip.core.errors import InputError
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Residuals = Callable[[Array], Array]
-"""Model minus data at the coordinates, shape (n,); what is not finite counts as infinitely bad."""
+"""Model minus data at the coordinates, shape (n,); values that are not finite count as infinitely bad."""
 
 Each = Callable[[Callable[[int], Array], Sequence[int]], Iterable[Array]]
-"""Computes the columns of a Jacobian: one after another, or, where they are dear, side by side."""
+"""Computes the columns of a Jacobian: in turn, or in parallel if they are expensive."""
 
 MOST_TRIES = 60
-"""Damped steps that may fail."""
+"""Most failed damped steps."""
 STEP = float(np.finfo(np.float64).eps) ** (1.0 / 3.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """A sum of squares that is to be least between bounds.
+    """A sum of squares to be minimised between bounds.
 
     Attributes
     ----------
     residuals : callable
     lower, upper : array, shape (p,)
     difference : float
-        Of coordinates, for Jacobians; relative above 1. Residuals that are exact to fewer digits need a larger one.
+        Step of the coordinates for Jacobians; relative above 1. Less precise residuals require a larger one.
     each : callable
         Computes the columns of a Jacobian; `map`, or `stickslip.identification.fit.parallel.mapped`.
     at_all : callable, optional
-        The residuals at several coordinates, shape (m, p), at once, shape (m, n): for residuals so cheap that the
-        calls themselves would cost most.
+        The residuals at several coordinates, shape (m, p), at once, shape (m, n): for residuals so cheap that the calls
+        themselves would dominate.
     """
 
     residuals: Residuals
@@ -52,7 +52,7 @@ class Squares:
     at_all: Residuals | None = None
 
     def begin(self, start: Array) -> Step:
-        """Where a descent begins: the start, moved inside the bounds.
+        """Return the starting point of a descent: the start, moved inside the bounds.
 
         Raises
         ------
@@ -71,7 +71,7 @@ class Squares:
 
 @dataclass(frozen=True)
 class Step:
-    """A step: where it leads, the damping for the next one, and the evaluations that it took."""
+    """A step: its end, the damping for the next one, and its number of evaluations."""
 
     u: Array
     residuals: Array
@@ -93,7 +93,7 @@ class Optimum:
     jacobian : array, shape (n, p)
         Zero columns for held coordinates.
     evaluations : int
-        Calls of the residuals, those for the Jacobian included.
+        Calls of the residuals, including those for the Jacobian.
     """
 
     u: Array
@@ -104,13 +104,13 @@ class Optimum:
 
 
 def cost_of(r: Array) -> float:
-    """Sum of squares; infinite where a residual is not finite."""
+    """Return the sum of squares; infinite if a residual is not finite."""
     total = float(r @ r)
     return total if math.isfinite(total) else math.inf
 
 
 def central_differences(squares: Squares, u: Array, free: Sequence[int]) -> Array:
-    """Jacobian by central differences inside the bounds, shape (n, p); error about 1e-10 of its scale."""
+    """Return the Jacobian by central differences inside the bounds, shape (n, p); error about 1e-10 of its scale."""
     residuals, step = squares.residuals, squares.difference
 
     def sides(i: int) -> tuple[Array, Array, float]:
@@ -130,7 +130,7 @@ def central_differences(squares: Squares, u: Array, free: Sequence[int]) -> Arra
     there = squares.at_all(np.array([*ahead, *behind]))
     width = np.array(widths)[:, None]
     difference = there[: len(free)] - there[len(free) :]
-    # Held between equal bounds: the column is 0, or not finite where the residuals are not.
+    # With equal bounds, the column is 0, or not finite if the residuals are not.
     return (difference / np.where(width > 0.0, width, 1.0)).T.copy()
 
 
@@ -143,7 +143,7 @@ def descend(
     tolerance: float = 1e-15,
     jacobian_there: bool = True,
 ) -> Optimum:
-    """The minimum that is reached from `start`.
+    """Find the minimum reached from `start`.
 
     Parameters
     ----------
@@ -151,13 +151,13 @@ def descend(
     start : array, shape (p,)
         Moved inside the bounds.
     held : sequence of int
-        Coordinates that stay.
+        Coordinates that are held fixed.
     iterations : int
-        Most Jacobians.
+        Greatest number of Jacobians.
     tolerance : float
-        Relative decrease of the sum of squares below which it ends.
+        Relative decrease of the sum of squares below which it stops.
     jacobian_there : bool
-        Whether the Jacobian is taken once more at the minimum; else it is that of one step before.
+        Whether the Jacobian is recomputed at the minimum; otherwise it is that of the step before.
 
     Returns
     -------
@@ -201,41 +201,41 @@ def descend(
 
 @dataclass(frozen=True)
 class Quadratic:
-    """The sum of squares of the linearised residuals, by a singular value decomposition, in some of the coordinates."""
+    """The sum of squares of the linearised residuals in some coordinates, by a singular value decomposition."""
 
     sizes: Array
     right: Array
     pull: Array
     places: Sequence[int]
-    """of these coordinates"""
+    """Indices of these coordinates."""
     scale: Array
-    """that they are divided by"""
+    """Their scales."""
 
     @staticmethod
     def of(columns: Array, r: Array, places: Sequence[int], scale: Array) -> Quadratic:
-        """Decompose their columns of the Jacobian once; every damping then costs a product."""
-        # Rotated onto their common span first: a tall Jacobian's own decomposition takes three times as long.
+        """Decompose the Jacobian's columns once; every damping then costs one product."""
+        # Reduced by QR first: the decomposition of a tall Jacobian itself is slower.
         both: Array = np.asarray(np.linalg.qr(np.column_stack([columns / scale, r]), "r"))
         left, sizes, right = np.linalg.svd(both[:, :-1], full_matrices=False)
         return Quadratic(sizes, right, left.T @ both[:, -1], places, scale)
 
     @staticmethod
     def normal(columns: Array, r: Array, places: Sequence[int], scale: Array) -> Quadratic:
-        """From the normal equations: half the digits at a tenth of the time, enough for an inexact Jacobian."""
+        """Build it from the normal equations: faster at half the digits, enough for an inexact Jacobian."""
         scaled = columns / scale
         values, vectors = np.linalg.eigh(scaled.T @ scaled)
         sizes = np.sqrt(np.maximum(values, 1e-16 * max(float(values[-1]), 1e-300)))
         return Quadratic(sizes, vectors.T, vectors.T @ (scaled.T @ r) / sizes, places, scale)
 
     def step(self, u: Array, damping: float, longest: float) -> Array:
-        """Where the damped step from u leads; no coordinate goes farther than `longest`."""
+        """Return the end of the damped step from u; no coordinate moves by more than `longest`."""
         there = u.copy()
         scaled = -(self.right.T @ (self.sizes * self.pull / (self.sizes**2 + damping)))
         there[self.places] += np.clip(scaled / self.scale, -longest, longest)
         return there
 
     def expected(self, damping: float) -> float:
-        """The decrease that this model expects of that step."""
+        """Return the expected decrease for that step."""
         s2 = self.sizes**2
         return float(np.sum(s2 * self.pull**2 * (s2 + 2.0 * damping) / (s2 + damping) ** 2))
 
@@ -244,9 +244,9 @@ def downhill(
     squares: Squares, here: Step, model: Quadratic, tolerance: float, tries: int = MOST_TRIES,
     longest: float = math.inf,
 ) -> Step:  # fmt: skip
-    """The first step that lowers the cost, damped more with every failure; the last failure where none does.
+    """Return the first step that lowers the cost, with damping increased at every failure; else the last failure.
 
-    No coordinate goes farther than `longest`.
+    No coordinate moves by more than `longest`.
     """
     u, cost, damping = here.u, here.cost, here.damping
     growth, tried = 2.0, 0
@@ -256,7 +256,7 @@ def downhill(
         new, expected = cost_of(r), model.expected(damping)
         tried += 1
         if new < cost:
-            # Nielsen's (1999) rule: less damping, the better the model foresaw the decrease.
+            # Nielsen's (1999) rule: the better the model predicts the decrease, the less damping.
             ratio = (cost - new) / expected if expected > 0.0 else 1.0
             damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0) ** 3), 1e-16)
             return Step(trial, r, new, damping, tried)
@@ -267,7 +267,7 @@ def downhill(
 
 
 def spread_starts(start: Array, lower: Array, upper: Array, count: int, reach: float) -> Array:
-    """`count` starts: `start` itself, and a Latin hypercube over the bounds, at most `reach` from it."""
+    """Return `count` starts: `start` itself, and a Latin hypercube over the bounds, at most `reach` from it."""
     if start.size == 0:  # everything is held
         return start[None, :]
     rng = np.random.default_rng(0)
@@ -280,7 +280,7 @@ def spread_starts(start: Array, lower: Array, upper: Array, count: int, reach: f
 def search(
     squares: Squares, starts: Array, *, rough: int = 15, polished: int = 6, tolerance: float = 1e-15
 ) -> list[Optimum]:
-    """Distinct minima, the best first: a short descent from every start of several, a full one from the best few.
+    """Find distinct minima, the best first: a short descent from every start, a full one from the best few.
 
     Raises
     ------
@@ -305,7 +305,7 @@ def search(
 
 
 def distinct(optima: Sequence[Optimum], distance: float) -> list[Optimum]:
-    """Those that lie farther than `distance` from every better one, in order."""
+    """Return those farther than `distance` from every better one, in order."""
     kept: list[Optimum] = []
     for o in optima:
         if all(float(np.max(np.abs(o.u - k.u), initial=0.0)) > distance for k in kept):

@@ -1,8 +1,8 @@
-"""Starts of a search that uses what is linear: only the other parameters are drawn at random.
+"""Starts of a separable search: only the nonlinear parameters are drawn at random.
 
-Separable least squares (Golub and Pereyra 1973): for drawn values of the parameters that act nonlinearly (Stribeck
-velocities, shape factors) the best values of the linear ones (torque levels, viscous friction) are solved for.
-Which parameters are linear is found by trying, so that it holds for any law.
+Separable least squares (Golub and Pereyra 1973): for drawn values of the nonlinear parameters (Stribeck velocities,
+shape factors) the best values of the linear ones (torque levels, viscous friction) are computed. Which parameters are
+linear is tested numerically, for any law.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Values = Callable[[Array], Array]
 
 REACH = 4.0
-"""How far the nonlinear parameters are drawn from the vector's start, in coordinates."""
+"""Greatest distance of drawn nonlinear parameters from the vector's start, in coordinates."""
 LARGEST = 1e150
 """Largest number in a column of the linear part: the square of a larger one overflows."""
 ITERATIONS = 100
-"""Of the linear part of a start: its active set changes once in each. (The reflective method of SciPy halves a step
-without end where rounding lets none succeed.) A start that takes more is as far as it then is; the search goes on."""
+"""Most iterations of the linear part of a start: its active set changes once in each. (SciPy's reflective method can
+halve its step without end because of rounding.) A start that requires more is kept as it then is."""
 
 
 def linear_parameters(model: Values, values: Array, candidates: Sequence[int]) -> list[int]:
-    """Places in `values` in which the model is affine jointly: no second difference, alone or mixed."""
+    """Return the places in `values` in which the model is jointly affine: no second difference, alone or mixed."""
     size = np.maximum(np.abs(values), 1e-3 * np.max(np.abs(values)))
     chosen: list[int] = []
     here = model(values)
@@ -51,12 +51,12 @@ def _affine(model: Values, values: Array, here: Array, size: Array, i: int, j: i
 
 
 def separable_starts(model: Values, target: Array, vector: Vector, count: int) -> Array:
-    """Starts for a vector without shares: its own, and `count` with the linear parameters solved for.
+    """Return starts for a vector without shares: its own, and `count` with the linear parameters solved for.
 
     Parameters
     ----------
     model : callable
-        Model values of the free parameters' values, in the scale of `target`.
+        Model values for values of the free parameters, in the scale of `target`.
     target : array, shape (n,)
     vector : Vector
     count : int
@@ -72,7 +72,7 @@ def separable_starts(model: Values, target: Array, vector: Vector, count: int) -
     rng = np.random.default_rng(0)
     low, high = np.maximum(vector.lower, first - REACH), np.minimum(vector.upper, first + REACH)
     upper = [vector.free[i].par.upper for i in linear]
-    # A level that has gone to nothing has its bound there, too.
+    # A level of 0 is at its bound there.
     floor = [min(1e-9 * float(np.max(np.abs(target))), 0.5 * upper[k]) if vector.free[i].logarithmic
              else vector.free[i].par.lower for k, i in enumerate(linear)]  # fmt: skip
     bounds = (np.array(floor), np.array(upper))
@@ -87,7 +87,7 @@ def separable_starts(model: Values, target: Array, vector: Vector, count: int) -
             if linear
             else None
         )
-        # Exponents that are drawn far off make powers whose squares overflow: such a start is left as drawn.
+        # Exponents drawn far away make powers whose squares overflow: such a start stays as drawn.
         if columns is not None and np.all(np.abs(columns) < LARGEST):
             drawn[linear] = bounded_solution(columns, target - base, *bounds)
         if all(math.isfinite(x) for x in drawn):
@@ -96,7 +96,7 @@ def separable_starts(model: Values, target: Array, vector: Vector, count: int) -
 
 
 def bounded_solution(columns: Array, target: Array, lower: Array, upper: Array) -> Array:
-    """Least squares within bounds by an active set (Stark and Parker 1995), `ITERATIONS` changes of it at most.
+    """Solve least squares within bounds by an active set (Stark and Parker 1995), at most `ITERATIONS` changes of it.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def bounded_solution(columns: Array, target: Array, lower: Array, upper: Array) 
     Returns
     -------
     array, shape (m,)
-        Inside the bounds; the best so far where the iterations did not suffice.
+        Inside the bounds; the best so far if the iterations did not suffice.
     """
     optimize: Any = importlib.import_module("scipy.optimize")  # it carries no types
     scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)

@@ -1,8 +1,7 @@
 """The noise level, which decides what a fit can claim.
 
-It is given, or estimated from repeats; the residual of the fit may raise it (a model that does not fit), and
-stands in for it only where there are enough points and the fit is not perfect: points that are met exactly say
-nothing about the noise.
+It is given, or estimated from repeats; the residual of the fit may raise it (a model that does not fit), and replaces
+it only if there are enough points and the fit is not perfect: a perfect fit contains no information about the noise.
 """
 
 from __future__ import annotations
@@ -19,12 +18,12 @@ from stickslip.core.errors import InputError
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 PERFECT = 1e-9
-"""Residuals below this part of the data's size are rounding: they say nothing about the noise."""
+"""Part of the data's size below which residuals are rounding, without information about the noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviation of one residual, where it comes from, and its degrees of freedom."""
+    """Standard deviation of one residual, its source, and its degrees of freedom."""
 
     std: float
     source: str
@@ -32,12 +31,12 @@ class Noise:
 
     @property
     def known(self) -> bool:
-        """Whether anything is known about the noise."""
+        """Whether the noise level is known."""
         return math.isfinite(self.std)
 
 
 def noise_of_repeats(groups: Sequence[Sequence[float] | Array]) -> Noise | None:
-    """Pooled standard deviation of repeated measurements; None where nothing was repeated."""
+    """Return the pooled standard deviation of repeated measurements; None without repeats."""
     arrays = [np.asarray(g, dtype=np.float64) for g in groups]
     dof = sum(a.size - 1 for a in arrays if a.size > 1)
     if dof == 0:
@@ -47,9 +46,9 @@ def noise_of_repeats(groups: Sequence[Sequence[float] | Array]) -> Noise | None:
 
 
 def noise_of_fit(cost: float, n: int, p: int, known: Noise | None, size: float) -> Noise:
-    """The noise that a fit may claim: the known one, raised by a residual that exceeds it.
+    """Return the noise level of a fit: the known one, raised by a residual that exceeds it.
 
-    Without a known one the residual's, where it is more than rounding and at least 3 points are to spare.
+    Without a known one it is the residual's, if that exceeds rounding and at least 3 degrees of freedom remain.
     """
     dof = n - p
     std = math.sqrt(cost / dof) if dof > 0 else math.nan
@@ -63,7 +62,7 @@ def noise_of_fit(cost: float, n: int, p: int, known: Noise | None, size: float) 
 
 
 def as_noise(level: Noise | float | None) -> Noise | None:
-    """A number as a given noise level.
+    """Convert a number to a given noise level.
 
     Raises
     ------
@@ -78,16 +77,16 @@ def as_noise(level: Noise | float | None) -> Noise | None:
 
 
 def white_std(signal: Array) -> float:
-    """Standard deviation of the white noise of equally spaced samples, in their unit, from third differences.
+    """Return the standard deviation of the white noise of equally spaced samples, in their unit, by differences.
 
-    The median of their size is that of the noise alone where the signal is smooth; a third difference multiplies the
-    variance of white noise by 20.
+    For a smooth signal the median of their size is that of the noise alone; a third difference multiplies the variance
+    of white noise by 20.
     """
     return 1.4826 * float(np.median(np.abs(np.diff(signal, 3)))) / math.sqrt(20.0)
 
 
 def quantile(noise: Noise, dof: int = 1) -> float:
-    """95 % quantile of the scaled rise of the sum of squares: chi-squared, or F where the noise is estimated."""
+    """Return the 95 % quantile of the scaled rise of the sum of squares: chi-squared, or F for an estimated noise."""
     from scipy import special
 
     if math.isinf(noise.dof):

@@ -1,4 +1,4 @@
-"""Independent pieces of work side by side in threads: simulations run in compiled code, without the interpreter."""
+"""Independent work in parallel threads: simulations run in compiled code, without the interpreter."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ R = TypeVar("R")
 
 
 def _cores() -> int:
-    """How many this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @functools.cache
 def _helpers() -> ThreadPoolExecutor | None:
-    """A thread for every core but the caller's that this process may use."""
+    """Return a pool with a thread for every available core except the caller's; None for a single core."""
     cores = _cores()
     return ThreadPoolExecutor(cores - 1, "stickslip") if cores > 1 else None
 
@@ -32,10 +32,10 @@ if hasattr(os, "register_at_fork"):
 
 
 def mapped(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
-    """The function of every item, in their order, which may call this in turn.
+    """Return the function of every item, in their order; calls may be nested.
 
-    The caller takes part: it works on what no helper has begun. So nobody waits for work that nobody does, and calls
-    within calls keep all cores busy.
+    The caller participates: it computes items that no helper has started. No thread therefore waits for idle work, and
+    nested calls keep all cores busy.
     """
     given, helpers = list(items), _helpers()
     if len(given) < 2 or helpers is None:
@@ -43,7 +43,7 @@ def mapped(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
     asked: list[Future[R]] = [helpers.submit(copy_context().run, function, x) for x in given]
     own: dict[int, R] = {}
     try:
-        # From the end, where helpers come last.
+        # From the end, which helpers reach last.
         for i in reversed(range(len(given))):
             if not asked[i].cancel():
                 break
@@ -55,9 +55,9 @@ def mapped(function: Callable[[T], R], items: Iterable[T]) -> list[R]:
 
 
 def in_turn(function: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
-    """The function of every item, in their order: the first alone, of the others as many ahead as there are cores.
+    """Yield the function of every item, in their order: the first alone, then as many at a time as there are cores.
 
-    For work that may end early, whose rest is then lost.
+    For work that may stop early, whose remaining results are then discarded.
     """
     coming = iter(items)
     for first in itertools.islice(coming, 1):

@@ -1,8 +1,8 @@
-"""Free and frozen parameters of a law, and of what moves with it, as one flat vector for optimisers.
+"""Free and frozen parameters of a law and its mechanics as one flat vector for optimisers.
 
-The coordinates of the vector are the logarithm of a positive parameter, the parameter over its typical size
-otherwise, and log ratios for shares that add up to 1, so that steps of the same size matter alike and no step
-inside the bounds leaves what the law allows.
+The coordinate of a positive parameter is its logarithm, of another parameter its value over its typical size, and of
+shares that add up to 1 their log ratios. Steps of equal size are therefore comparable, and every point inside the
+bounds is valid for the law.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from stickslip.models.model import Model
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LARGEST = 230.0
-"""Logarithms of parameters stay between 1e-100 and 1e100, so that no step overflows."""
+"""Greatest magnitude of a parameter's logarithm: values between 1e-100 and 1e100 prevent overflow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +36,10 @@ class Parameter:
         ``fc``; ``k[1]`` for element 1 (counted from 0).
     par : Par
     value : float
-        Where the search starts, or the value it is frozen at.
+        Starting value of the search, or the frozen value.
     free : bool
     shares : str
-        The name of the group whose values add up to 1; empty for none.
+        Name of the group whose values add up to 1; empty for none.
     scale : float
         Typical size of a parameter that may be zero or negative.
     """
@@ -53,7 +53,7 @@ class Parameter:
 
     @property
     def logarithmic(self) -> bool:
-        """Whether its coordinate is a logarithm: it is positive by its bounds."""
+        """Whether its coordinate is a logarithm: its bounds make it positive."""
         return self.par.positive or self.par.lower > 0.0
 
     @property
@@ -62,7 +62,7 @@ class Parameter:
         return self.par.positive or self.par.lower >= 0.0
 
     def coordinate(self, value: float) -> float:
-        """The coordinate of a value."""
+        """Return the coordinate of a value."""
         if self.logarithmic:
             return math.log(value) if value > 0.0 else -LARGEST
         return value / self.scale
@@ -82,14 +82,14 @@ class Vector:
     Parameters
     ----------
     model : Model or None
-        The law, and the values at which its parameters start or are frozen.
+        The law, and the starting or frozen values of its parameters.
     free, frozen : sequence of str, optional
-        Names of the free or the frozen parameters; ``k`` means every element, ``k[1]`` one. Without `free` all
-        are free but those in `frozen`.
+        Names of the free or the frozen parameters; ``k`` means every element, ``k[1]`` one. Without `free` all except
+        those in `frozen` are free.
     extra : sequence of Parameter
         Other numbers (inertia, offset); they come first.
     limits : mapping of str to (float, float)
-        Tighter bounds of the search, by full name; what the law itself allows stays as it is.
+        Tighter bounds of the search, by full name; the law's own bounds remain.
     """
 
     def __init__(
@@ -129,8 +129,10 @@ class Vector:
         return tuple(p.name for p in self.free)
 
     def signed_scale(self, friction: float) -> dict[str, float]:
-        """What the half-width of each parameter that may have either sign is compared with: angles with a radian,
-        torques with `friction`, N·m (N)."""
+        """Return the scale for the half-width of each parameter that may have either sign.
+
+        It is one radian for angles and `friction`, N·m (N), for torques.
+        """
         return {p.name: 1.0 if p.par.unit == "rad" else friction for p in self.free}
 
     @property
@@ -154,13 +156,13 @@ class Vector:
         return np.array([p.limits[1] for p in self._plain] + [30.0] * (self.size - len(self._plain)))
 
     def coordinate_of(self, name: str) -> int | None:
-        """The place of a free parameter's own coordinate; None for a share."""
+        """Return the index of a free parameter's own coordinate; None for a share."""
         return next((i for i, p in enumerate(self._plain) if p.name == name), None)
 
     # ---- the map ---------------------------------------------------------------------------------------------
 
     def coordinates(self, values: Mapping[str, float]) -> Array:
-        """Coordinates of named values of the free parameters, shape (size,)."""
+        """Return the coordinates of named values of the free parameters, shape (size,)."""
         out = [p.coordinate(values[p.name]) for p in self._plain]
         for group in self._groups:
             last = values[group[-1].name]
@@ -168,13 +170,13 @@ class Vector:
         return np.clip(np.array(out, dtype=np.float64), self.lower, self.upper)
 
     def named(self, u: Array) -> dict[str, float]:
-        """Every parameter by name, frozen ones too."""
+        """Return every parameter by name, including frozen ones."""
         values = dict(self._fixed)
         values.update(zip(self._order, self._free_values(u), strict=True))
         return values
 
     def _free_values(self, u: Array) -> list[float]:
-        """Values of the free parameters, those that share one after the others."""
+        """Return the values of the free parameters, with shares last."""
         flat = u.tolist()
         out = [
             math.exp(x) if logarithmic else x * scale
@@ -191,12 +193,12 @@ class Vector:
         return out
 
     def values(self, u: Array) -> Array:
-        """Values of the free parameters, shape (number of them,)."""
+        """Return the values of the free parameters, shape (number of free parameters,)."""
         named = self.named(u)
         return np.array([named[p.name] for p in self.free], dtype=np.float64)
 
     def jacobian(self, u: Array) -> Array:
-        """Derivatives of the free values by the coordinates, shape (free parameters, size)."""
+        """Return the derivatives of the free values by the coordinates, shape (free parameters, size)."""
         values = self.values(u)
         place = {p.name: i for i, p in enumerate(self.free)}
         out = np.zeros((len(self.free), self.size))
@@ -213,11 +215,11 @@ class Vector:
         return out
 
     def law_parameters(self, u: Array) -> Any:
-        """The law's parameters, unchecked: for the inner loop of a fit."""
+        """Return the law's parameters, unchecked: for the inner loop of a fit."""
         return self._parameters(self.named(u))
 
     def packed(self, u: Array) -> Array:
-        """The law's parameters as the flat array that compiled functions read."""
+        """Return the law's parameters as the flat array of compiled functions."""
         out = self._packed.copy()
         for place, value in zip(self._places, self._free_values(u), strict=True):
             if place is not None:
@@ -225,15 +227,15 @@ class Vector:
         return np.array(out, dtype=np.float64)
 
     def packed_values(self, values: Array) -> Array:
-        """The same for values of the free parameters."""
+        """Return that array for values of the free parameters."""
         return self.packed_named({**self._fixed, **dict(zip(self.names, values.tolist(), strict=True))})
 
     def packed_named(self, named: Mapping[str, float]) -> Array:
-        """The same for every parameter by name, as `named` gives them."""
+        """Return that array for every parameter by name, as returned by `named`."""
         return np.array([named[x] if isinstance(x, str) else x for x in self._flat], dtype=np.float64)
 
     def model(self, u: Array) -> Model:
-        """The law with these parameters.
+        """Return the law with these parameters.
 
         Raises
         ------
@@ -244,7 +246,7 @@ class Vector:
         return Model(self.base.law, **self._law_values(self.named(u)))
 
     def complaint(self, u: Array) -> str:
-        """What the law has against these parameters together; empty for nothing."""
+        """Return the law's error message for these parameters; empty if it accepts them."""
         assert self.base is not None
         check = self.base.law.check
         return check(self.law_parameters(u)) if check else ""
@@ -266,7 +268,7 @@ class Vector:
 
 
 def _parameters_of(model: Model | None) -> list[Parameter]:
-    """Every number of a model's law, all free."""
+    """Return every number of a model's law, all free."""
     if model is None:
         return []
     out: list[Parameter] = []
@@ -281,9 +283,9 @@ def _parameters_of(model: Model | None) -> list[Parameter]:
 
 
 def _flat_names(model: Model) -> list[Any]:
-    """What stands at every place of the flat array that compiled functions read: a parameter, or how many there are.
+    """Return the entry of every place in the flat array of compiled functions: a parameter's name, or a count.
 
-    The numbers of elements are the model's, whatever the parameters.
+    The counts of elements are the model's, whatever the parameters.
     """
     fields, p = model.law.fields, model.parameters
     counts = {f.name: len(getattr(p, f.name)) for f in fields if f.per_element}
@@ -295,7 +297,7 @@ def _flat_names(model: Model) -> list[Any]:
 
 
 def _limited(parameter: Parameter, limits: Mapping[str, tuple[float, float]]) -> Parameter:
-    """The parameter with bounds as tight as asked for."""
+    """Return the parameter with the requested tighter bounds."""
     if parameter.name not in limits:
         return parameter
     low, high = limits[parameter.name]
@@ -304,7 +306,7 @@ def _limited(parameter: Parameter, limits: Mapping[str, tuple[float, float]]) ->
 
 
 def _matched(wanted: list[str], parameters: Sequence[Parameter]) -> set[str]:
-    """The full names that `wanted` means."""
+    """Return the full names of the parameters in `wanted`."""
     names = [p.name for p in parameters]
     out: set[str] = set()
     for name in wanted:

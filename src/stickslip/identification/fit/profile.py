@@ -18,17 +18,17 @@ from stickslip.identification.fit.noise import Noise, quantile
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 FARTHEST = 12.0
-"""How far a profile is followed: a factor of 160,000 in a logarithmic coordinate."""
+"""Greatest distance that a profile is followed: a factor of 160,000 in a logarithmic coordinate."""
 
 
 def inverse_information(jacobian: Array) -> tuple[Array, Any]:
-    """Inverse of J'J and, per coordinate, whether the data determine it at all to first order."""
+    """Return the inverse of J'J and, per coordinate, whether the data determine it to first order."""
     root, seen = inverse_root(jacobian)
     return root @ root.T, seen
 
 
 def inverse_root(jacobian: Array) -> tuple[Array, Any]:
-    """R with R R' = inverse of J'J, and what `inverse_information` says of each coordinate."""
+    """Return R with R R' = inverse of J'J, and the second result of `inverse_information`."""
     size = np.linalg.norm(jacobian, axis=0)
     weights = np.where(size > 0.0, size, 1.0)
     _, s, vt = np.linalg.svd(jacobian / weights, full_matrices=False)
@@ -38,10 +38,10 @@ def inverse_root(jacobian: Array) -> tuple[Array, Any]:
 
 
 def long_run(scores: Array, lags: int) -> Array:
-    """Covariance of the sum of correlated scores (n, p), Bartlett's window: Newey and West 1987."""
+    """Return the covariance of the sum of correlated scores (n, p), Bartlett's window: Newey and West 1987."""
     n = scores.shape[0]
     reach = min(lags, n - 1)
-    # All lags at once, by the spectrum; padded, so that the end does not meet the beginning.
+    # All lags at once, by the spectrum; padded against wrap-around.
     length = 1 << (n + reach).bit_length()
     window = np.zeros(length)
     window[: reach + 1] = 1.0 - np.arange(reach + 1) / (lags + 1.0)
@@ -59,11 +59,11 @@ class Profiles:
     Attributes
     ----------
     bounds : mapping of int to (float, float)
-        Interval of each coordinate; infinite where the data set no limit.
+        Interval of each coordinate; infinite if the data set no limit.
     family : array, shape (m, p)
-        Coordinates met on the way that the noise does not tell from the best fit.
+        Coordinates found along the profiles that the noise does not distinguish from the best fit.
     better : array, shape (p,), or None
-        A start for a better minimum, if one was met on the way; then the rest is incomplete.
+        A start for a better minimum, if one was found; then the rest is incomplete.
     """
 
     bounds: dict[int, tuple[float, float]]
@@ -76,21 +76,21 @@ def profiles_of(
 ) -> Profiles:
     """Follow the profile of every coordinate to both sides.
 
-    `best` is the minimum to a part `tolerance` of its sum of squares: what is lower by less is no other minimum.
+    `best` is the minimum to a part `tolerance` of its sum of squares: a smaller decrease is not another minimum.
     """
     inverse, seen = inverse_information(best.jacobian)
     target = np.full(best.u.size, quantile(noise) * noise.std**2)
     if lags > 0:
         robust = np.diag(inverse @ long_run(best.jacobian * best.residuals[:, None], lags) @ inverse)
         with np.errstate(invalid="ignore", divide="ignore"):
-            # Negative where rounding decides: then the noise alone counts.
+            # Negative because of rounding: then the noise alone counts.
             ratio = quantile(noise) * robust / np.diag(inverse)
             target = np.where(seen & (ratio > 0.0), ratio, target)
     reach: dict[tuple[int, float], float] = {}
     family = [best.u]
-    # What the data tell least comes first: a better minimum, after which all begins anew, is met on its profile.
+    # The least determined coordinate first: a better minimum, which restarts everything, is found on its profile.
     order = sorted(range(best.u.size), key=lambda i: -inverse[i, i] if seen[i] else -math.inf)
-    # A second round goes on from fits met on other profiles that lie beyond what the first one reached.
+    # A second round continues from fits on other profiles that are beyond the reach of the first one.
     for again in (False, True):
         for i in order:
             valley = inverse[:, i] / inverse[i, i] if inverse[i, i] > 0.0 else np.eye(best.u.size)[i]
@@ -114,7 +114,7 @@ def profiles_of(
 
 
 class Profile:
-    """One side of the profile of coordinate i: the least sum of squares where it is held at a distance."""
+    """One side of the profile of coordinate i: the least sum of squares with it held at a distance."""
 
     def __init__(
         self, squares: Squares, best: Optimum, i: int, side: float, target: float, valley: Array,
@@ -128,9 +128,9 @@ class Profile:
         self.better: Array | None = None
 
     def end(self, step: float, farthest: float, near: float, start: Array) -> float:
-        """The distance at which the sum of squares has risen by the target; infinite if it does not.
+        """Return the distance at which the sum of squares has risen by the target; infinite if it does not.
 
-        The search goes outwards from `near`, where `start` is a fit that has not risen so far.
+        The search goes outwards from `near`, where `start` is a fit that has risen by less.
         """
         if farthest <= near:
             return math.inf
@@ -163,8 +163,8 @@ class Profile:
         return far
 
     def rise(self, distance: float, guess: Array) -> float:
-        """By how much the sum of squares is above its minimum; infinite where the model has no values."""
-        # Along the valley first; where it bends too much for that, from where the search stands.
+        """Return the rise of the sum of squares above its minimum; infinite if the model is not finite."""
+        # Along the valley first; if that bends too much, from the present point.
         straight = guess.copy()
         straight[self.i] = self.best.u[self.i] + self.side * distance
         along = guess + np.clip(self.valley * (straight[self.i] - guess[self.i]), -1.0, 1.0)

@@ -1,9 +1,9 @@
-"""What a record can say of a contact that is stiff: it rings with the mass, and samples must show that.
+"""The limit that the sample rate sets on a stiff contact: it rings with the mass, and samples must resolve that.
 
 A contact at rest is a spring. A bristle whose inner loops do not close (LuGre; elasto-plastic friction near break-away,
-above its z_ba) slips a little with every oscillation; where it rings faster than the samples show, unseen vibration
-lowers the torque at which it breaks away, as a dither does (``armstrong1994``), and shifts all that slow motion tells
-of the law. Sliding at speed is not touched.
+above its z_ba) slips a little with every oscillation; if it rings faster than the samples resolve, unseen vibration
+lowers the torque at which it breaks away, as dither does (``armstrong1994``), and biases all estimates from slow
+motion. Sliding at speed is unaffected.
 """
 
 from __future__ import annotations
@@ -22,32 +22,33 @@ from stickslip.identification.experiment import Experiment
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SAMPLES = 3.0
-"""Samples that a period of the contact's vibration must have."""
+"""Least samples per period of the contact's vibration."""
 REVERSING = 0.05
 """Part of the usual highest speed below which an axis is about to reverse or stop."""
 TINY, SOON = 1e-9, 1e-3
-"""rad (m) by which a contact is moved to feel its stiffness, in a second; s within which its damping is felt, too."""
+"""Displacement that tests a contact's stiffness within a second, rad (m); time within which its damping shows, too,
+s."""
 SLOWER = 10.0 ** np.arange(-4.0, 0.0, 0.25)
-"""Parts of the highest speed at which a parameter's effect on the sliding torque is looked for."""
+"""Parts of the highest speed at which a parameter's effect on the sliding torque is evaluated."""
 NOTHING = 1e-3
-"""Part of its greatest effect that a parameter of slow motion may have left at the highest speed."""
+"""Greatest remaining effect at the highest speed of a slow-motion parameter, part of its greatest effect."""
 EXCHANGED = 1e-3
-"""Part of its effect on sliding that must be its own for sliding to tell a parameter."""
+"""Least part of a parameter's effect on sliding that no others explain, for sliding to determine it."""
 
 
 def stiffness_at_rest(law: Law, parameters: Any) -> float:
-    """Torque over displacement of a contact at rest, N·m/rad (N/m); 0 for a law that has no state."""
+    """Return torque over displacement of a contact at rest, N·m/rad (N/m); 0 for a law without a state."""
     return moved(law, parameters, 1.0) / TINY if law.state_fields else 0.0
 
 
 def moved(law: Law, parameters: Any, time: float) -> float:
-    """Torque after a tiny displacement from rest within that time, s."""
+    """Return the torque after a tiny displacement from rest within that time, s."""
     speed = TINY / time
     return abs(law.step(speed, speed, time, law.state(parameters), parameters, Surroundings()))
 
 
 def contact_frequency(law: Law, parameters: Any, inertia: float) -> float:
-    """Frequency at which the inertia, kg·m² (kg), rings on the contact at rest, Hz; 0 where it does not ring."""
+    """Return the frequency at which the inertia, kg·m² (kg), rings on the contact at rest, Hz; 0 without ringing."""
     stiffness = stiffness_at_rest(law, parameters)
     if stiffness == 0.0:
         return 0.0
@@ -59,21 +60,21 @@ def contact_frequency(law: Law, parameters: Any, inertia: float) -> float:
 def of_slow_motion(
     law: Law, parameters: Any, name: str, highest: float, free: Iterable[str] | None = None
 ) -> bool:
-    """Whether only slow motion and rest tell a parameter of the law: ``fs``, ``vs``, ``sigma0``.
+    """Return whether only slow motion and rest determine a parameter of the law: ``fs``, ``vs``, ``sigma0``.
 
-    It has nothing to say at the highest speed; or what it says of sliding other free parameters say as well, as where
-    the level is a product of stiffness and displacement: sliding then tells the product.
+    It has no effect at the highest speed, or other free parameters have the same effect on sliding: if the level is a
+    product of stiffness and displacement, sliding determines the product.
 
     Parameters
     ----------
     law : Law
     parameters : NamedTuple
-        The law's.
+        The law's parameters.
     name : str
     highest : float
-        Speed in the records, rad/s (m/s).
+        Highest speed in the records, rad/s (m/s).
     free : iterable of str, optional
-        Names of what is fitted beside it; all of the law's where not given.
+        Names of the fitted parameters; None for all of the law's.
     """
     own = numbers_of(law, parameters)
     if name not in own or law.steady is None:
@@ -82,7 +83,7 @@ def of_slow_motion(
     effect = effect_of(law, parameters, name, speeds)
     if abs(effect[-1]) <= NOTHING * float(np.max(np.abs(effect))):
         return True
-    shares = {f.name for f in law.fields if f.par.shares}  # they add up to 1, and change no level
+    shares = {f.name for f in law.fields if f.par.shares}  # They add up to 1 and do not change the level.
     beside = [
         n
         for n in (own if free is None else free)
@@ -100,7 +101,7 @@ def of_slow_motion(
 
 
 def numbers_of(law: Law, parameters: Any) -> list[str]:
-    """Names of all numbers of a law, ``k[1]`` for one of several."""
+    """Return the names of all numbers of a law, ``k[1]`` for one of several."""
     names: list[str] = []
     for f in law.fields:
         count = len(getattr(parameters, f.name)) if f.per_element else 0
@@ -109,7 +110,7 @@ def numbers_of(law: Law, parameters: Any) -> list[str]:
 
 
 def effect_of(law: Law, parameters: Any, name: str, speeds: Array) -> Array:
-    """Change of the sliding torque at some speeds with one of the law's numbers, shape (n,)."""
+    """Return the change of the sliding torque at some speeds with one of the law's numbers, shape (n,)."""
     assert law.steady is not None
     field, _, place = name.partition("[")
     value = getattr(parameters, field)
@@ -123,27 +124,27 @@ def effect_of(law: Law, parameters: Any, name: str, speeds: Array) -> Array:
 
 
 def changed(value: float) -> float:
-    """A little more."""
+    """Return a slightly larger value, for a finite difference."""
     return value + 1e-4 * max(abs(value), 1e-3)
 
 
 def unseen_refused(
     estimates: Sequence[Estimate], law: Law, parameters: Any, inertia: float, highest: float, period: float
 ) -> tuple[Estimate, ...]:
-    """The estimates, those of slow motion refused where the contact rings faster than the samples show.
+    """Return the estimates; those of slow motion become not identified if the contact rings too fast for the samples.
 
     Parameters
     ----------
     estimates : sequence of Estimate
     law : Law
     parameters : NamedTuple
-        The law's.
+        The law's parameters.
     inertia : float
         kg·m² (kg).
     highest : float
-        The highest speed in the records, rad/s (m/s).
+        Highest speed in the records, rad/s (m/s).
     period : float
-        Between samples, s.
+        Sample period, s.
     """
     ringing = contact_frequency(law, parameters, inertia)
     if law.non_local_memory or ringing * period * SAMPLES <= 1.0:
@@ -168,17 +169,17 @@ def unresolved_refused(
     experiments: Sequence[Experiment],
     friction: float,
 ) -> tuple[Estimate, ...]:
-    """The estimates, those of pre-sliding refused where the contact passes its pre-sliding travel within few samples.
+    """Return the estimates; those of pre-sliding become not identified if too few samples resolve it.
 
     Parameters
     ----------
     estimates : sequence of Estimate
     law : Law
     parameters : NamedTuple
-        The law's.
+        The law's parameters.
     experiments : sequence of Experiment
     friction : float
-        Level of friction, N·m (N): over the stiffness at rest it is the pre-sliding travel.
+        Level of friction, N·m (N): divided by the stiffness at rest it is the pre-sliding travel.
     """
     stiffness = stiffness_at_rest(law, parameters)
     if stiffness == 0.0:
@@ -200,21 +201,21 @@ def unresolved_refused(
 
 
 def of_presliding(law: Law, parameters: Any, name: str, speeds: Array) -> bool:
-    """Whether a number of the law has no effect on its torque at constant velocity."""
+    """Return whether a number of the law has no effect on its torque at constant velocity."""
     if law.steady is None or name not in numbers_of(law, parameters):
         return False
     return not np.any(effect_of(law, parameters, name, speeds))
 
 
 def samples_within(experiment: Experiment, travel: float) -> Array:
-    """Samples behind every reversal or start until the position is farther than `travel`, shape (reversals,)."""
+    """Return the samples from every reversal or start until the position moved by `travel`, shape (reversals,)."""
     q, speed = experiment.position, np.abs(experiment.velocity())
     fast = float(np.quantile(speed, 0.95))
     slow = speed < REVERSING * fast
     begins = np.flatnonzero(np.diff(slow.astype(np.int8)) == 1) + 1
     out: list[float] = []
     for begin in begins.tolist():
-        # From the last sample at which it is as good as at rest until it has left.
+        # From the last sample nearly at rest until it has left.
         rest = slow[begin:]
         leaves = begin + (int(np.argmin(rest)) if not rest.all() else rest.size - 1)
         still = begin + int(np.argmin(speed[begin : leaves + 1]))

@@ -1,4 +1,4 @@
-"""Choosing among models: information criteria and cross-validation. Burnham and Anderson (2002)."""
+"""Model selection: information criteria and cross-validation. Burnham and Anderson (2002)."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Criteria:
 
 
 def criteria(cost: float, n: int, p: int, noise: Noise | None = None) -> Criteria:
-    """AICc and BIC of a fit with p parameters to n points: Burnham and Anderson 2002, eqs. 2.4 and 6.
+    """Return AICc and BIC of a fit with p parameters to n points: Burnham and Anderson 2002, eqs. 2.4 and 6.
 
-    With a noise level that does not come from the residual, the likelihood is that of known noise.
+    If the noise level does not come from the residual, the likelihood is that of known noise.
     """
     if noise is not None and noise.known and noise.source in ("given", "repeats"):
         fitted, count = cost / noise.std**2, p
@@ -39,16 +39,16 @@ def criteria(cost: float, n: int, p: int, noise: Noise | None = None) -> Criteri
 def cross_validate(
     error: Callable[[Indices, Indices], Array], n: int, folds: int = 10, together: Indices | None = None
 ) -> float:
-    """Root mean square of errors on points left out.
+    """Return the root mean square of errors on points left out.
 
     Parameters
     ----------
     error : callable
         ``error(fitted, left_out)``: errors at the points `left_out` of a fit to the points `fitted` (indices).
     n, folds : int
-        Points, and groups in which they are left out; as many as points leaves out one at a time.
+        Number of points, and of groups that are left out in turn; `folds` = `n` leaves out one point at a time.
     together : array, shape (n,), optional
-        Labels 0, 1, ...: points of the same label are left out together, so that no twin of a point tells it.
+        Labels 0, 1, ...: points of the same label are left out together, since related points would reveal each other.
     """
     label = np.arange(n) if together is None else together
     count = int(np.max(label)) + 1

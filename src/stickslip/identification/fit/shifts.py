@@ -1,4 +1,4 @@
-"""A shift by whole samples that leaves the least: looked for coarsely, then all about the best."""
+"""The shift by whole samples with the least residual: a coarse search, then all shifts about the best."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ Whole = np.ndarray[Any, np.dtype[np.int64]]
 
 
 def shifts_looked_at(misfits: Callable[[Whole], Array], reach: int, parts: int) -> tuple[Whole, Array]:
-    """Shifts up to `reach` in either direction, 0 among them, ascending, and what each leaves.
+    """Return shifts up to `reach` in either direction, including 0, in ascending order, and their residuals.
 
     Parameters
     ----------
     misfits : callable
-        What shifts leave, shape (shifts,).
+        Returns the residuals of shifts, shape (shifts,).
     parts : int
-        Of `reach`: so many are looked at first.
+        Number of parts of `reach` in the coarse search.
     """
     step = max(1, reach // parts)
     coarse: Whole = np.union1d(np.arange(-reach, reach + 1, step), [0, reach])
@@ -30,7 +30,7 @@ def shifts_looked_at(misfits: Callable[[Whole], Array], reach: int, parts: int) 
 
 
 def least_between(shifts: Whole, left: Array) -> float:
-    """What a shift by a part of a sample beside the best would leave: the lowest of the parabola through three."""
+    """Return the least residual between samples: the minimum of the parabola through the best three."""
     best = int(np.argmin(left))
     if not 0 < best < len(left) - 1 or shifts[best + 1] - shifts[best - 1] != 2:
         return float(left[best])

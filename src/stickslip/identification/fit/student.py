@@ -1,19 +1,19 @@
-"""Quantiles of Student's distribution; `scipy.special` has them, and takes a tenth of a second to import."""
+"""Quantiles of Student's distribution, replacing those of `scipy.special`, whose import is slow."""
 
 from __future__ import annotations
 
 import math
 
 SETTLED = 1e-15
-"""Relative change at which a fraction or a root is taken as found."""
+"""Relative change at which a fraction or a root has converged."""
 TERMS = 300
-"""Of the fraction, and steps of the root, at most."""
+"""Most terms of the fraction, and most steps of the root."""
 NORMAL = 1e6
-"""Degrees of freedom from which on it is the normal distribution, to a millionth."""
+"""Degrees of freedom above which it is the normal distribution, to a millionth."""
 
 
 def student_quantile(freedom: float, probability: float = 0.975) -> float:
-    """What Student's distribution stays below with a probability of more than a half.
+    """Return the quantile of Student's distribution for a probability of more than a half.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def student_quantile(freedom: float, probability: float = 0.975) -> float:
         low, high = high, 2.0 * high
     x = high
     for _ in range(TERMS):
-        # Newton's method, kept between the bounds that are known.
+        # Newton's method, kept between the known bounds.
         gap = above(x, n) - tail
         low, high = (x, high) if gap > 0.0 else (low, x)
         following = x + gap / density(x, n)
@@ -43,13 +43,13 @@ def student_quantile(freedom: float, probability: float = 0.975) -> float:
 
 
 def density(t: float, n: float) -> float:
-    """Of Student's distribution with n degrees of freedom."""
+    """Return the density of Student's distribution with n degrees of freedom."""
     log = math.lgamma(0.5 * (n + 1.0)) - math.lgamma(0.5 * n) - 0.5 * (n + 1.0) * math.log1p(t * t / n)
     return math.exp(log) / math.sqrt(n * math.pi)
 
 
 def above(t: float, n: float) -> float:
-    """Probability above t > 0: half the incomplete beta function of n / (n + t²) (``abramowitz1964``, 26.7.1)."""
+    """Return the probability above t > 0, half the incomplete beta function (``abramowitz1964``, 26.7.1)."""
     x = n / (n + t * t)
     a, b = 0.5 * n, 0.5
     log = math.lgamma(a + b) - math.lgamma(a) - math.lgamma(b) + a * math.log(x) + b * math.log1p(-x)
@@ -59,7 +59,7 @@ def above(t: float, n: float) -> float:
 
 
 def fraction(a: float, b: float, x: float) -> float:
-    """The continued fraction of the incomplete beta function (``abramowitz1964``, 26.5.8), by Lentz's method."""
+    """Return the continued fraction of the incomplete beta function (``abramowitz1964``, 26.5.8), by Lentz's method."""
     c, d = 1.0, 1.0 / (1.0 - (a + b) * x / (a + 1.0))
     found = d
     for m in range(1, TERMS):

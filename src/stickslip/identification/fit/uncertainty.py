@@ -1,4 +1,4 @@
-"""How well data determine parameters: weighted least squares from many starts, intervals and verdicts.
+"""Uncertainty of parameters: weighted least squares from many starts, intervals and verdicts.
 
 The noise level is in `stickslip.identification.fit.noise`, the search in `optimum`, profile intervals in `profile`.
 """
@@ -32,30 +32,30 @@ from stickslip.identification.fit.profile import Profiles, inverse_root, long_ru
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 RATIO = 2.0
-"""A positive parameter is identified where upper/lower is at most this."""
+"""Greatest upper/lower of an identified positive parameter."""
 NOTHING = 1e-9
-"""Of the upper end: a lower one that is none but the least that a positive parameter can be."""
+"""Part of the upper bound below which a lower bound is 0 in effect, the least of a positive parameter."""
 SHARE = 0.1
-"""A signed parameter is identified where the half-width is at most this part of its scale (friction for torques)."""
+"""Greatest half-width of an identified signed parameter, part of its scale (friction for torques)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A least-squares fit and what it determines.
+    """A least-squares fit and its estimates.
 
     Attributes
     ----------
     vector : Vector
     optimum : Optimum
-        The best found; ``optimum.u`` are its coordinates.
+        The best one found; ``optimum.u`` are its coordinates.
     others : tuple of Optimum
-        Minima elsewhere that the noise does not tell from the best.
+        Other minima that the noise does not distinguish from the best.
     noise : Noise
     covariance, correlation : array, shape (free parameters, free parameters)
-        Of the values; not a number where the noise or the direction is unknown.
+        Covariance and correlation of the values; NaN where the noise or the direction is unknown.
     estimates : tuple of Estimate
     family : array, shape (m, vector.size)
-        Coordinates of fits, along the profiles and elsewhere, that the noise does not tell from the best.
+        Coordinates of fits, along the profiles and elsewhere, that the noise does not distinguish from the best.
     """
 
     vector: Vector
@@ -74,7 +74,7 @@ class Fit:
 
     @property
     def values(self) -> dict[str, float]:
-        """Every parameter by name, frozen ones too."""
+        """Every parameter by name, including frozen ones."""
         return self.vector.named(self.optimum.u)
 
     @property
@@ -98,32 +98,32 @@ def fit(
     difference: float = STEP,
     at_all: Residuals | None = None,
 ) -> Fit:
-    """Fit by least squares from many starts, and say what the data determine.
+    """Fit by least squares from many starts, and judge which parameters the data determine.
 
     Parameters
     ----------
     residuals : callable
         ``residuals(u)``: model minus data at the vector's coordinates, shape (n,), each divided by its relative
-        standard deviation, so that all share one noise level.
+        standard deviation, for a common noise level.
     vector : Vector
     noise : Noise or float, optional
         Standard deviation of a residual, in its unit.
     size : float
-        Size of the data (largest torque, say), against which a perfect fit is recognised.
+        Size of the data (such as the largest torque), against which a perfect fit is recognised.
     signed_scale : float or mapping of str to float
-        What the half-width of a parameter that may be negative is compared with: Fc for torques.
+        Scale for the half-width of a parameter that may be negative: Fc for torques.
     starts : int or array, shape (m, vector.size)
-        How many, or which. 1 starts at the vector's own values only.
+        Number of starts, or the starts. 1 starts at the vector's own values only.
     reach : float
-        How far from the vector's start the others lie, in coordinates.
+        Greatest distance of the other starts from the vector's, in coordinates.
     profiles : bool
         Follow the profile likelihood; otherwise intervals come from the covariance.
     lags : int
-        Samples over which residuals are correlated; 0 where they are independent.
+        Samples over which residuals are correlated; 0 if they are independent.
     tolerance : float
-        Relative decrease of the sum of squares at which a descent ends.
+        Relative decrease of the sum of squares at which a descent stops.
     difference : float
-        Of coordinates, for Jacobians; larger where residuals are exact to fewer digits.
+        Step of the coordinates for Jacobians; larger for less precise residuals.
     at_all : callable, optional
         ``residuals`` at several coordinates at once (`Squares`).
 
@@ -161,9 +161,10 @@ def follow_profiles(
     squares: Squares, optima: Sequence[Optimum], known: Noise | None, *, size: float, profiles: bool, lags: int,
     tolerance: float,
 ) -> tuple[Sequence[Optimum], Noise, Profiles]:  # fmt: skip
-    """Optima, best first, their noise and their profiles, which start again from every better minimum that one meets.
+    """Return optima, best first, their noise and their profiles, restarted from every better minimum on a profile.
 
-    The profiles are empty where none are asked for, the noise is unknown, or the last of 8 still met a better minimum.
+    The profiles are empty if none are requested, the noise is unknown, or the last of 8 rounds still met a better
+    minimum.
     """
     level = noise_of_fit(optima[0].cost, optima[0].residuals.size, optima[0].u.size, known, size)
     for _ in range(8 if profiles else 0):
@@ -179,7 +180,7 @@ def follow_profiles(
 
 
 def covariance_of(vector: Vector, best: Optimum, noise: Noise, lags: int) -> tuple[Array, Array]:
-    """Covariance and correlation of the free values."""
+    """Return covariance and correlation of the free values."""
     root, seen = inverse_root(best.jacobian)
     if lags > 0:
         inner = root.T @ long_run(best.jacobian * best.residuals[:, None], lags) @ root
@@ -190,7 +191,7 @@ def covariance_of(vector: Vector, best: Optimum, noise: Noise, lags: int) -> tup
     change = vector.jacobian(best.u)
     moved = change @ root
     moved[np.any(change[:, ~seen] != 0.0, axis=1)] = math.nan
-    # As squares: where the data hardly tell two values apart, rounding would make correlations beyond 1.
+    # As squares: for two hardly distinguishable values, rounding would give correlations beyond 1.
     covariance = moved @ moved.T
     std = np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -215,7 +216,7 @@ def _estimates(
         place = vector.coordinate_of(p.name)
         value = float(values[k])
         low, high = interval_of(p, value, width * std, bounds.get(place) if place is not None else None)
-        # A fit met on another parameter's profile counts as well: this one's may have lost its valley.
+        # A fit on another parameter's profile counts as well: this parameter's profile may have left its valley.
         low, high = min(low, float(np.min(elsewhere[:, k]))), max(high, float(np.max(elsewhere[:, k])))
         scale = signed_scale.get(p.name, math.nan) if isinstance(signed_scale, Mapping) else signed_scale
         why = verdict_on(p, value, low, high, noise, scale)
@@ -226,7 +227,7 @@ def _estimates(
 def interval_of(
     p: Parameter, value: float, half: float, profile: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """95 % interval of a value: its profile's, else from the half-width in its coordinate, within the bounds."""
+    """Return a value's 95 % interval: its profile's, or from the half-width in its coordinate, within the bounds."""
     if profile is not None:
         ends = [math.exp(x) if p.logarithmic else x * p.scale for x in profile]
     elif p.logarithmic and math.isfinite(half):
@@ -238,9 +239,9 @@ def interval_of(
 
 
 def verdict_on(p: Parameter, value: float, low: float, high: float, noise: Noise, scale: float) -> str:
-    """Why a parameter is not identified; empty where it is.
+    """Return the reason why a parameter is not identified; empty if it is.
 
-    Positive ones need upper/lower of at most 2, signed ones a half-width of at most 10 % of `scale`.
+    Positive ones require upper/lower of at most 2, signed ones a half-width of at most 10 % of `scale`.
     """
     if not noise.known:
         return "the noise level is unknown: give it, or repeat measurements"
@@ -258,7 +259,7 @@ def verdict_on(p: Parameter, value: float, low: float, high: float, noise: Noise
 def too_wide(half: float, unit: str, scale: float) -> str:
     """Explain why a half-width is too wide for `scale`, the level of friction for a torque; empty if it is not.
 
-    A level that is not above 0 is no friction: it cannot measure the width of anything.
+    A level that is not positive is not friction and cannot be a scale.
     """
     torque, unit = unit in ("N·m", "N"), axis_unit(unit)
     if not 0.0 < scale < math.inf:

@@ -1,4 +1,4 @@
-"""Methods of identification: one file a method. `METHODS` names them.
+"""Methods of identification, one file each. `METHODS` lists them.
 
 To add one, write its file (a function of records and `Options`, and METHOD, which names the options that it uses) and
 add its name to the tuple: the command line, `stickslip.identify` and the tests then include it.
@@ -28,7 +28,7 @@ METHODS = (
 
 
 def method_named(name: str) -> Method:
-    """The method of that name.
+    """Return the method of that name.
 
     Raises
     ------

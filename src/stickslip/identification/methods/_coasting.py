@@ -1,7 +1,7 @@
-"""Points of a sliding curve from an axis that coasts: with the torque off, friction is what decelerates its inertia.
+"""Points of a sliding curve from a coasting axis: with the torque off, friction decelerates its inertia.
 
-At every instant F(v) = -J dv/dt. Velocity and acceleration are seen through one smooth window inside gross sliding, in
-the weak form: nothing is differentiated but the window (`stickslip.identification.windows`).
+At every instant F(v) = -J dv/dt. Velocity and acceleration come from one smooth window inside gross sliding, in the
+weak form: only the window is differentiated (`stickslip.identification.windows`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from stickslip.identification.steady_friction.points import SlidingPoints
 from stickslip.machines.servo import ServoAxis
 
 APART = 3
-"""Rows from point to point: half a window, beyond which the noise of neighbours hardly correlates."""
+"""Rows between points: half a window, beyond which the noise of neighbours is hardly correlated."""
 
 
 def coasting_points(records: Sequence[Record], inertia: float) -> tuple[SlidingPoints, tuple[str, ...]]:
@@ -31,9 +31,9 @@ def coasting_points(records: Sequence[Record], inertia: float) -> tuple[SlidingP
     Parameters
     ----------
     records : sequence of Record
-        With positions; a torque, if there is one, is 0 throughout.
+        With positions; a torque, if present, is 0 throughout.
     inertia : float
-        kg·m² (kg)
+        Inertia, kg·m² (kg).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""From records to experiments of an axis, as the options say; and what is refused before anything is computed."""
+"""Conversion of records to experiments of an axis according to the options, with checks before any computation."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ RANGES = {"limit": "greater than 0", **dict.fromkeys(NOT_NEGATIVE, "a finite num
 
 
 def experiments_of(records: Sequence[Record], options: Options) -> tuple[ServoAxis, list[Experiment]]:
-    """The axis and an experiment for every record."""
+    """Return the axis and an experiment for every record."""
     axis = axis_of(records[0], options)
     return axis, [experiment(record, axis, options) for record in records]
 
 
 def driven(records: Sequence[Record], options: Options) -> None:
-    """Refuse records that lack what moves the axis, and numbers that nothing would be multiplied by."""
+    """Refuse records without the signal that drives the axis, and constants that no signal uses."""
     _, experiments = experiments_of(records, options)
     refuse_unused(records, experiments, options)
 
 
 def refuse_unused(records: Sequence[Record], experiments: Sequence[Experiment], options: Options) -> None:
-    """A motor's constant that nothing is multiplied by would be left out in silence."""
+    """Refuse a motor's constant that no signal uses: it would be ignored silently."""
     quantities = {t.quantity for t in experiments} if options.drive_gain is None else {"gain"}
     derived = any("motor_torque" in r.meta.get("derived", {}) for r in records)
     unused: list[str] = []
@@ -56,7 +56,7 @@ def refuse_unused(records: Sequence[Record], experiments: Sequence[Experiment], 
 
 
 def axis_of(record: Record, options: Options) -> ServoAxis:
-    """The axis; the reader has brought the record to one side of the gearing already."""
+    """Return the axis; the reader has already converted the record to one side of the gearing."""
     linear = record.units.get("position") == "m"
     return ServoAxis(
         motion="linear" if linear else "rotary", drive_side="load",
@@ -69,12 +69,12 @@ def axis_of(record: Record, options: Options) -> ServoAxis:
 
 
 def motor_constant(record: Record, options: Options, linear: bool) -> float | None:
-    """Torque per current, N·m/A (N/A of a linear axis), as the options say or else what the record was read by.
+    """Return the torque per current, N·m/A (N/A for a linear axis), from the options or else from the record's reading.
 
     Raises
     ------
     InputError
-        If the options give a linear motor's to an axis that turns.
+        If the options give a linear motor's constant for a rotary axis.
     """
     if options.force_constant is not None and not linear:
         raise InputError(
@@ -82,14 +82,14 @@ def motor_constant(record: Record, options: Options, linear: bool) -> float | No
             "record's positions are angles; "
             f"leave it out, or give {name_option('torque_constant', 'NM_PER_A')}"
         )
-    known = record.meta.get("reading", {}).get("drive", {})  # a profile's, too
+    known = record.meta.get("reading", {}).get("drive", {})  # Including a profile's.
     said = [getattr(options, name) for name in MOTORS]
     kept = [known.get(name) for name in (MOTORS if linear else MOTORS[:1])]
     return next((value for value in (*said, *kept) if value is not None), None)
 
 
 def experiment(record: Record, axis: ServoAxis, options: Options) -> Experiment:
-    """The record as an experiment."""
+    """Return the record as an experiment."""
     name = str(record.meta.get("reading", {}).get("file", "")) or "record"
     loop = str(record.meta.get("loop", ""))
     if loop and not {"position_reference", "reference"} & set(record.channels):
@@ -100,7 +100,7 @@ def experiment(record: Record, axis: ServoAxis, options: Options) -> Experiment:
         )
     recorded = bool(set(DRIVES) & set(record.channels))
     output = options.loop_output or ("torque" if options.resistance is None else "voltage")
-    if recorded or output != "voltage":  # a signal in V or A is what it is, whatever supplies it
+    if recorded or output != "voltage":  # A signal in V or A does not depend on the supply.
         record = replace(record, channels={k: v for k, v in record.channels.items() if k != "supply"})
     if options.extra_torque and (loop or "motor_torque" not in record.channels):
         why = (
@@ -117,7 +117,7 @@ def experiment(record: Record, axis: ServoAxis, options: Options) -> Experiment:
 
 
 def loop_of(given: str | Mapping[str, float | ReferenceVelocity]) -> Loop:
-    """The sampled controller of ``kp=..,kd=..`` or ``kv=..,kvp=..``, or of a mapping with these names."""
+    """Return the sampled controller of ``kp=..,kd=..`` or ``kv=..,kvp=..``, or of a mapping with these names."""
     numbers, reference_velocity = split_loop(given)
     if reference_velocity == "instant":
         raise InputError(

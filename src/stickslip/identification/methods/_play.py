@@ -1,4 +1,4 @@
-"""The dead travel of an axis's motor at its reversals, beside the axis's other numbers: that of the doctor."""
+"""The dead travel of an axis's motor at its reversals, as the doctor finds it, added to the axis's other numbers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HOLDS_ZERO = "its interval holds 0"
 def with_dead_travel(
     found: Identification, experiments: Sequence[Experiment], axis: ServoAxis
 ) -> Identification:
-    """The axis's result with ``dead_travel``, where one of the records shows one; of several the most often seen."""
+    """Return the axis's result with ``dead_travel``, if a record shows one; of several the most often seen."""
     unit, force = axis.unit("rad"), axis.unit("N·m")
     seen = [
         one

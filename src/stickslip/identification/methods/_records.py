@@ -1,4 +1,4 @@
-"""What methods that need records alone share: the channel of the torque, the sliding curve known before."""
+"""Common parts of methods that read records only: the channel of the torque and the known sliding curve."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOTORS = ("torque_constant", "force_constant")
 
 
 def torque_channel(records: Sequence[Record], options: Options, method: str) -> str:
-    """The channel of the torque: the one named, or the first known one that all records have."""
+    """Return the channel of the torque: the one named, or the first known one that all records have."""
     have = [set(r.channels) for r in records]
     if options.torque:
         for channels in have:
@@ -57,13 +57,13 @@ def with_extra(record: Record, extra: str, torque: str) -> Record:
 
 
 def with_torque(records: Sequence[Record], options: Options, method: str) -> tuple[list[Record], str]:
-    """Return the records, a known extra torque added, and the channel of their torque."""
+    """Return the records with a known extra torque added, and the channel of their torque."""
     channel = torque_channel(records, options, method)
     return [with_extra(r, options.extra_torque, channel) for r in records], channel
 
 
 def refuse_idle_motor(records: Sequence[Record], options: Options) -> None:
-    """Refuse a motor's constant that nothing is multiplied by, since a torque is recorded.
+    """Refuse a motor's constant that would be unused because a torque is recorded.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def refuse_idle_motor(records: Sequence[Record], options: Options) -> None:
 
 
 def has_torque(method: str) -> Callable[[Sequence[Record], Options], None]:
-    """The check of a method: every record has a torque."""
+    """Return a method's check that every record has a torque."""
 
     def check(records: Sequence[Record], options: Options) -> None:
         with_torque(records, options, method)
@@ -90,7 +90,7 @@ def has_torque(method: str) -> Callable[[Sequence[Record], Options], None]:
 
 
 def known_curve(options: Options, method: str, own: Sequence[str]) -> Model:
-    """Return the sliding curve known before: the model given, or Stribeck's, with the values given.
+    """Return the known sliding curve: the given model, or Stribeck's with the given values.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def without_constant_torque(record: Record, channel: str, options: Options) -> R
 
 
 def single(records: Sequence[Record], method: str) -> Record:
-    """The one record that a method takes."""
+    """Return the only record of a method that accepts one."""
     if len(records) != 1:
         raise InputError(
             f"{name_option('method', method)} takes one record, not {len(records)}; run it for each"

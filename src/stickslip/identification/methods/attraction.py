@@ -15,7 +15,7 @@ from stickslip.identification.presliding.hysteresis import Loop
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """The attraction parameter of the model given."""
+    """Identify the attraction parameter of the given model."""
     record, model = single(records, "attraction"), options.model
     if model is None or model.law.name != "gms":
         raise InputError(

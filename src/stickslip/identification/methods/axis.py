@@ -1,4 +1,4 @@
-"""Inertia, offset or gravity and friction jointly, from any motion (`stickslip.identification.axis`)."""
+"""Joint identification of inertia, offset or gravity and friction from any motion (`stickslip.identification.axis`)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from stickslip.machines.servo import ServoAxis
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """The whole axis; the last records judge where some are held out."""
+    """Identify the whole axis; the last records validate it if some are held out."""
     axis, experiments = experiments_of(records, options)
     count = len(experiments) - options.held_out
     skew, said = stated_delay(experiments[:count], options.torque_is, options.delay)
@@ -41,7 +41,7 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
 def with_map(
     axis: ServoAxis, experiments: Sequence[Experiment], count: int, skew: float | None, options: Options
 ) -> Identification:
-    """The axis and what its torque over the angle is, from the first so many experiments."""
+    """Identify the axis and its torque over the angle from the first `count` experiments."""
     try:
         over = over_angle(experiments[:count], axis, skew, options.estimate)
     except InputError as error:
@@ -54,7 +54,7 @@ def with_map(
 def by_law(
     axis: ServoAxis, experiments: Sequence[Experiment], count: int, skew: float | None, options: Options
 ) -> Identification:
-    """The axis by its laws, or by least squares alone."""
+    """Identify the axis with its laws, or by plain least squares."""
     fitted, held = experiments[:count], experiments[count:]
     refuse_for_every_law(axis, fitted, options)
     if options.inverse:
@@ -73,8 +73,8 @@ def by_law(
 
 
 BEHIND = {"commanded": -0.5, "actual": 0.0, "mean": 0.5}
-"""Rows by which a column lies behind the torque: a command acts half a row after its row, on average, and a mean over
-the row before acted half a row before it."""
+"""Delay of a column relative to the torque, rows: a command acts half a row after its row on average, and a mean over
+the row before is centred half a row before it."""
 TAKEN = (
     f"With {name_option('delay')} alone the torque column counts as commanded from its row to the next "
     f"({name_option('torque_is', 'commanded')}); say "
@@ -90,14 +90,14 @@ ALONE = (
 def stated_delay(
     experiments: Sequence[Experiment], torque_is: str | None, delay: float | None
 ) -> tuple[float | None, list[str]]:  # fmt: skip
-    """s by which the torque's column lies behind the torque that acted, where that is stated, and what is to be said.
+    """Return the stated delay of the torque's column relative to the torque that acted, s, or None, and notes.
 
-    What the column holds does not say how late a current loop makes it act: without the delay nothing is held.
+    The meaning of the column does not determine the delay of a current loop: without the delay nothing is held.
 
     Raises
     ------
     UnknownName
-        If there is no such meaning of a column.
+        If the meaning of the column is unknown.
     """
     if torque_is is not None and torque_is not in BEHIND:
         raise UnknownName("torque_is", torque_is, BEHIND)
@@ -110,7 +110,7 @@ def stated_delay(
 def contradictions(
     experiments: Sequence[Experiment], axis: ServoAxis, skew: float, estimate: EstimateSliding
 ) -> list[str]:
-    """That sliding shows another delay than the stated one, in a sentence; nothing where it does not tell."""
+    """Report that sliding contradicts the stated delay, in a sentence; none if it does not."""
     if any(t.drive is None for t in experiments):
         return []
     try:
@@ -120,13 +120,13 @@ def contradictions(
 
 
 def refuse_for_every_law(axis: ServoAxis, experiments: Sequence[Experiment], options: Options) -> None:
-    """Refuse what is wrong whatever the law: each law's search would say the same once more.
+    """Refuse options that are wrong for every law, before each law's search repeats the error.
 
     Raises
     ------
     InputError
-        If an inertia is given that is not positive, a parameter is named that neither a law nor the axis has, or one
-        is to be held that has no value.
+        If a given inertia is not positive, a named parameter belongs neither to a law nor to the axis, or a held
+        parameter has no value.
     """
     inertia = options.values.get("inertia", 1.0)
     if not inertia > 0.0:
@@ -134,7 +134,7 @@ def refuse_for_every_law(axis: ServoAxis, experiments: Sequence[Experiment], opt
     of_axis = {p.name for p in mechanics_parameters(axis, experiments[0].quantity, {}, 0, 0)}
     known = of_axis | {f.name for x in options.laws or AUTOMATIC for f in law_of(x).fields} | LEVELS
     names = [*options.values, *options.free, *options.frozen]
-    # One direction's own parameters, and torques over the position, are known where they are searched for.
+    # Parameters of one direction, and torques over the position, are known only in their search.
     plain = [n for n in names if not n.endswith(NEGATIVE) and not n.startswith(("cos", "sin", "friction_"))]
     require_known(plain, known)
     neutral = {"drive_gain", "back_emf", "backlash", "controller_gain", "load_motor", "load_external"}
@@ -145,7 +145,7 @@ def refuse_for_every_law(axis: ServoAxis, experiments: Sequence[Experiment], opt
 MOTION = AXIS | {"held_out", "inverse", "per_direction", "harmonics", "position_map", "torque_is", "delay"}
 """Options of both ways to identify an axis."""
 LEAST_SQUARES = MOTION | {"laws", "values", "frozen", "inertia"}
-"""Options of the plain inverse dynamics, some of which it refuses with a reason of its own."""
+"""Options of the plain inverse dynamics; it refuses some of them with its own message."""
 METHOD = Method(
     "axis", "inertia, offset or gravity and friction jointly", identify, driven,
     uses=LEAST_SQUARES | {"free", "load", "intervals", "robust"}, narrowed={"inverse": LEAST_SQUARES},
@@ -153,7 +153,7 @@ METHOD = Method(
 
 
 def refuse_held(options: Options) -> None:
-    """Refuse what the plain inverse dynamics, which fits every number of one law, would ignore.
+    """Refuse options that the plain inverse dynamics would ignore: it fits every number of one law.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from stickslip.identification.presliding.breakaway import identify_breakaway
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """Torque at the break, per direction."""
+    """Identify the torque at the break, per direction."""
     records, torque = with_torque(records, options, "breakaway")
     more = {} if options.threshold is None else {"threshold": options.threshold}
     return identify_breakaway(records, torque=torque, **more)

@@ -17,7 +17,7 @@ GEAR = "gear_ratio"
 
 
 def channel_of(records: Sequence[Record], options: Options) -> str:
-    """The channel of the torque, or of the current where no torque is known."""
+    """Return the channel of the torque, or of the current if no torque is known."""
     have = [set(r.channels) for r in records]
     for name in (options.torque,) if options.torque else (*TORQUES, "current"):
         if all(name in channels for channels in have):
@@ -31,14 +31,14 @@ def channel_of(records: Sequence[Record], options: Options) -> str:
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """Even and odd part of the torque over the angle."""
+    """Identify the even and odd part of the torque over the angle."""
     channel = channel_of(records, options)
     records = [with_extra(r, options.extra_torque, channel) for r in records]
     return identify_cogging(records, torque=channel, gear=gear_of(options), progress=options.progress)
 
 
 def gear_of(options: Options) -> float:
-    """Turns of the position's shaft for one of the slowest."""
+    """Return the turns of the position's shaft per turn of the slowest shaft."""
     for name in options.values:
         if name != GEAR:
             raise UnknownName(f"value of {name_option('method', 'cogging')}", name, (GEAR,))
@@ -52,7 +52,7 @@ def gear_of(options: Options) -> float:
 
 
 def check(records: Sequence[Record], options: Options) -> None:
-    """Refuse records without torque or current, and values that are not looked at."""
+    """Refuse records without torque or current, and values that are not used."""
     channel_of(records, options)
     gear_of(options)
 

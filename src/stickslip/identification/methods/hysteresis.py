@@ -16,11 +16,11 @@ from stickslip.identification.methods.method import TORQUE, Method, Options
 from stickslip.identification.presliding.hysteresis import Loop, choose_hysteresis, templates_for
 
 ROWS = 8000
-"""Rows that a loop is fitted to: of 25,000 the same values come in a tenth of the time."""
+"""Most rows to which a loop is fitted: more take longer and hardly change the values."""
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """The law that says best what blocks left out hold."""
+    """Identify the law that best predicts blocks left out."""
     (record,), channel = with_torque([single(records, "hysteresis")], options, "hysteresis")
     whole = Loop.of(record, channel)
     every = max(1, whole.time.size // ROWS)

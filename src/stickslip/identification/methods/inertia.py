@@ -13,7 +13,7 @@ from stickslip.identification.response.inertia import inertia
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """Return the inertia; a procedure's record of several currents is taken apart into one response each."""
+    """Identify the inertia; a procedure's record of several currents is split into one response each."""
     parts = [part for record in records for _, part in pieces("", record)]
     axis, experiments = experiments_of(parts, options)
     return inertia(experiments, axis)

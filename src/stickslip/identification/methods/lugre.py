@@ -23,7 +23,7 @@ OWN = ("inertia", "offset")
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """sigma0 and sigma1 of one response; the inertia is among the values."""
+    """Identify sigma0 and sigma1 from one response; the inertia is among the values."""
     record = single(records, "lugre")
     if "inertia" not in options.values:
         raise InputError(

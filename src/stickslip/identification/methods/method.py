@@ -1,4 +1,4 @@
-"""What a method of identification is: a name, what it needs, and a function of records and options."""
+"""Description of a method of identification: a name, its requirements, and a function of records and options."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from stickslip.models import plugins
 from stickslip.models.model import Model
 
 LONGEST_DELAY = 1.0
-"""s"""
+"""Longest delay that can be stated, s."""
 TorqueIs = Literal["commanded", "actual", "mean"]
 
 
 @dataclass(frozen=True)
 class Options:
-    """What an identification is asked for; a method reads what concerns it.
+    """Options of an identification; a method reads those that it uses.
 
     Attributes
     ----------
@@ -33,19 +33,19 @@ class Options:
         Names, paths of law files, or laws; empty: the method's own candidates.
     values, frozen, free, model, noise, elements, shares, threshold, inverse, per_direction, pendulum, drive_gain, \
     resistance, loop_output, extra_torque, torque_is, delay, harmonics, position_map, load, intervals, robust
-        As of `stickslip.verbs.identify.identify`, which says what each is, with its unit.
+        As in `stickslip.verbs.identify.identify`, which describes each with its unit.
     torque : str
-        Channel of the torque; empty: the first known one. Not for the method `axis`.
+        Channel of the torque; empty for the first known one. Not for the method `axis`.
     held_out : int
-        How many of the records, the last ones, are not fitted but judge the result (axis).
+        Number of records, the last ones, that are not fitted but validate the result (axis).
     model_offset : float
         Constant torque in the file of the model, N·m.
     torque_constant, force_constant : float or None
-        N·m/A of a motor that turns, N/A of a linear one.
+        N·m/A of a rotary motor, N/A of a linear one.
     estimate : callable
-        `stickslip.identification.sliding.estimate_sliding`, or a memo of it that does not repeat the doctor's.
+        `stickslip.identification.sliding.estimate_sliding`, or a memo of it that avoids repeating the doctor's.
     progress : callable
-        Is told what begins, in a few words.
+        Called with a short description of each step as it starts.
     """
 
     laws: tuple[str | Law, ...] = ()
@@ -100,24 +100,24 @@ class Options:
 
 
 ARGUMENTS = {"laws": "law", "held_out": "hold_out", "torque": "torque_channel"}
-"""Arguments that have another name than the field of `Options`."""
+"""Arguments whose names differ from the fields of `Options`."""
 OF_EVERY_METHOD = ("torque_constant", "force_constant", "model_offset", "estimate", "progress")
-"""Fields that no method refuses: how a log is read, and how it is computed."""
+"""Fields that every method accepts: the reading of a log, and the computation."""
 AXIS = frozenset({"pendulum", "drive_gain", "resistance", "loop", "loop_output", "extra_torque"})
-"""Options that turn a record into an experiment of an axis."""
+"""Options for converting a record to an experiment of an axis."""
 TORQUE = frozenset({"torque", "extra_torque"})
 """Options of every method that reads a torque from records."""
 
 
 def name_field(field_name: str) -> str:
-    """Refer to the option that a field of `Options` is from."""
+    """Return the name of the option behind a field of `Options`."""
     return name_option(ARGUMENTS.get(field_name, field_name))
 
 
 def given_in(options: Options, *, inertia: bool, loop: bool, hold_out: bool) -> tuple[str, ...]:
     """Return the names of the options that differ from their defaults.
 
-    ``inertia``, ``loop`` and ``hold_out`` are given apart from `options`, which have them among other things.
+    ``inertia``, ``loop`` and ``hold_out`` are passed separately, since `options` combine them with others.
     """
     neutral = Options()
     own = {f.name for f in fields(Options)} - {*OF_EVERY_METHOD, "held_out"}
@@ -127,7 +127,7 @@ def given_in(options: Options, *, inertia: bool, loop: bool, hold_out: bool) -> 
         if f.name in own and getattr(options, f.name) != getattr(neutral, f.name)
     ]
     if inertia:
-        # It is among the values, and of an axis among the frozen ones.
+        # It is one of the values, and for an axis one of the frozen ones.
         alone = {"values": set(options.values) <= {"inertia"}, "frozen": set(options.frozen) <= {"inertia"}}
         changed = [name for name in changed if not alone.get(name, False)]
     apart = (("inertia", inertia), ("loop", loop), ("held_out", hold_out))
@@ -144,18 +144,18 @@ class Method:
     identify : callable
         ``identify(records, options) -> Identification``.
     check : callable
-        ``check(records, options)`` refuses, before anything is computed, records that lack what it needs.
+        ``check(records, options)`` refuses, before any computation, records that lack what the method requires.
     uses : frozenset of str
         Names of the options that it uses: fields of `Options`, ``loop`` and ``inertia``. Others are refused.
     narrowed : mapping of str to frozenset of str
-        By the name of an option: the options that the method uses if that one is given.
+        For an option, by name: the options that the method uses if that one is given.
     takes_steady_points : bool
-        Whether a table of velocities and torques without times will do.
+        Whether a table of velocities and torques without times is accepted.
     takes_current : bool
-        Whether a current without a torque constant will do.
+        Whether a current without a torque constant is accepted.
     values : tuple of str, or None
-        Names that a value may be set for, none of which is free or frozen; None: what is set, free and frozen are
-        parameters of a law, which it looks at itself.
+        Names for which a value may be set; none of them may be free or frozen. None: set, free and frozen names are
+        parameters of a law, which the method checks itself.
     """
 
     name: str
@@ -196,7 +196,7 @@ class Method:
                 raise InputError(f"{one} does not use {other}; leave out one of them")
 
     def refuse_unknown(self, options: Options) -> None:
-        """Refuse what is set, free or frozen and would go unheard.
+        """Refuse names of set, free or frozen parameters that would be ignored.
 
         Raises
         ------
@@ -215,13 +215,13 @@ class Method:
 
 
 def refuse_unsaid(options: Options, known: Set[str]) -> None:
-    """Refuse to hold a parameter at a value that nobody gave: it would be one where a search starts.
+    """Refuse to hold a parameter without a given value: it would be held at a search's starting value.
 
     Parameters
     ----------
     options : Options
     known : set of str
-        Names of what has a value of its own.
+        Names of parameters that have values of their own.
 
     Raises
     ------
@@ -237,5 +237,5 @@ def refuse_unsaid(options: Options, known: Set[str]) -> None:
 
 
 def law_of(given: str | Law) -> Law:
-    """The law of that name or file, or the law itself, with the choices that any law has."""
+    """Return the law of that name or file, or the given law completed with the choices that any law has."""
     return plugins.law(given) if isinstance(given, str) else plugins.completed(given)

@@ -22,7 +22,7 @@ OWN = ("inertia", "offset")
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """Elements from the loops of one record; the inertia is among the values where it is known."""
+    """Identify elements from the loops of one record; the inertia is among the values if it is known."""
     (record,), channel = with_torque([single(records, "presliding")], options, "presliding")
     curve = known_curve(options, "presliding", OWN)
     return identify_presliding(

@@ -1,5 +1,7 @@
-"""Fit a curve to the torques at constant velocities (`stickslip.identification.steady_friction.curve`), with one law
-chosen of several."""
+"""Fit of a curve to the torques at constant velocities, with a choice among several laws.
+
+The curve is that of `stickslip.identification.steady_friction.curve`.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,7 @@ PER_DIRECTION = (
 
 
 def identify(records: Sequence[Record], options: Options) -> Identification:
-    """Fit the laws named, or the curves of the thesis, together with a constant torque; choose one of several."""
+    """Fit the named laws, or the curves of the thesis, together with a constant torque; choose one of several."""
     measured, notes = measured_points(records, options)
     points = replace(measured, offset=known_offset(measured, options))
     if options.laws:
@@ -62,7 +64,7 @@ def identify(records: Sequence[Record], options: Options) -> Identification:
 
 
 def measured_points(records: Sequence[Record], options: Options) -> tuple[SlidingPoints, tuple[str, ...]]:
-    """Return velocities and friction torques: of a coasting axis if its inertia is given, else as `points_in`."""
+    """Return velocities and friction torques: of a coasting axis if its inertia is given, else those of `points_in`."""
     inertia = options.values.get("inertia")
     if inertia is not None:
         return coasting_points(records, inertia)
@@ -101,14 +103,14 @@ def points_in(records: Sequence[Record], torque: str) -> tuple[SlidingPoints, tu
 
 
 def known_offset(points: SlidingPoints, options: Options) -> float | None:
-    """Return the constant torque that the user gave, N·m; None if it is to be fitted.
+    """Return the constant torque given by the user, N·m; None if it is fitted.
 
     With friction parameters for each direction it is 0 unless it was given: it cannot be distinguished from them.
 
     Raises
     ------
     InputError
-        If parameters for each direction are to be fitted and the points are of one.
+        If parameters for each direction are requested but the points are of one direction.
     """
     if options.per_direction and points.one_way:
         raise InputError(
@@ -122,8 +124,7 @@ def known_offset(points: SlidingPoints, options: Options) -> float | None:
 
 
 def refuse_unknown(options: Options, templates: Iterable[Model]) -> None:
-    """Refuse names of parameters that none of the curves has, and to free what is free anyway, or to hold what
-    has no value.
+    """Refuse unknown parameter names, freeing a parameter that is free anyway, and holding one without a value.
 
     Raises
     ------
@@ -142,7 +143,7 @@ def refuse_unknown(options: Options, templates: Iterable[Model]) -> None:
 
 
 def template(law: Law, velocity: Array, torque: Array, options: Options) -> Model:
-    """A law on the scales of a sliding curve, where the search starts."""
+    """Return a law scaled to a sliding curve, as the start of the search."""
     speed = float(np.max(np.abs(velocity)))
     known = {k: v for k, v in options.values.items() if k in {f.name for f in law.fields}}
     return starts(law, float(np.median(np.abs(torque))), 0.0, speed, 1.0, known)[0]

@@ -1,1 +1,1 @@
-"""Prediction error: an observer holds a simulated axis to the measured motion."""
+"""Prediction error: an observer makes a simulated axis follow the measured motion."""

@@ -1,4 +1,4 @@
-"""What an observer must correct: the torque that a simulated axis lacks, whitened, outliers weighed.
+"""Corrections of the observer: the torque that a simulated axis lacks, whitened, with outliers weighted down.
 
 See `stickslip.identification.observer.prediction_error` for the method that minimises it.
 """
@@ -25,32 +25,33 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 MakeMechanics = Callable[[Mapping[str, float]], Mechanics]
 
 BAND = 40.0
-"""Hz up to which corrections count, where the sample rate allows it."""
+"""Bandwidth of the corrections, Hz, if the sample rate allows it."""
 ORDER = 16
 """Order of the autoregression."""
 FIRST = np.array([1.0, -0.9])
 """The whitening filter before the corrections are known."""
 FREEDOM = 10.0
-"""Degrees of freedom of Student's distribution that weighs outliers."""
+"""Degrees of freedom of Student's distribution against outliers."""
 BLOCK = 0.25
-"""s of a segment that is left out: some correlation times of the disturbance."""
+"""Length of a segment that is left out, s: some correlation times of the disturbance."""
 REACH = 3.0
-"""Coordinates (factors of e) by which what the data leave open may lie elsewhere."""
+"""Prior standard deviation of undetermined coordinates (factors of e)."""
 DRAWS = 16
-"""Times that the corrections are perturbed."""
+"""Number of perturbations of the corrections."""
 MEMORY = 0.15
-"""s over which they are perturbed alike."""
+"""Correlation time of a perturbation, s."""
 DIFFERENCE = 5e-3
-"""Of coordinates, for Jacobians: a contact that breaks away a sample later makes the residuals rough below it."""
+"""Step of the coordinates for Jacobians: residuals are rough below it, since a contact may break away a sample
+later."""
 
 
 # ---- noise -----------------------------------------------------------------------------------------------------
 
 
 def autoregression(e: Sequence[Array], order: int) -> Array:
-    """Coefficients (1, a_1 ... a_p) of the filter that whitens the series: Yule and Walker's equations.
+    """Return the coefficients (1, a_1 ... a_p) of the filter that whitens the series, by the Yule-Walker equations.
 
-    What lies beyond 4 standard deviations (robust) counts as if it lay there.
+    Values beyond 4 (robust) standard deviations are clipped.
     """
     border = 4.0 * robust_std(np.concatenate(list(e)))
     r = np.zeros(order + 1)
@@ -62,9 +63,9 @@ def autoregression(e: Sequence[Array], order: int) -> Array:
 
 
 def durbin(r: Sequence[float]) -> list[float]:
-    """Weights of a series' last values, the latest first, for its next one (Durbin's recursion).
+    """Return the weights of a series' last values, the latest first, for its next one (Durbin's recursion).
 
-    ``r`` are its autocovariances from 0 on, one more than weights. Written out: `scipy.linalg` takes long to load.
+    ``r`` are its autocovariances from lag 0, one more than weights. It replaces `scipy.linalg`, whose import is slow.
     """
     x = [r[1] / r[0]]
     for m in range(1, len(r) - 1):
@@ -78,18 +79,18 @@ def durbin(r: Sequence[float]) -> list[float]:
 
 
 def whitened(filter_: Array, e: Array) -> Array:
-    """The series behind the filter, without the values that its start spoils."""
+    """Return the filtered series without the values affected by its start."""
     return np.convolve(e, filter_, "valid")
 
 
 def robust_std(r: Array) -> float:
-    """Standard deviation from the median of the sizes; not that of a series of which more than half is 0."""
+    """Return the standard deviation from the median magnitude; the plain one if more than half of the values are 0."""
     middle = 1.4826 * float(np.median(np.abs(r)))
     return middle if middle > 0.0 else max(float(np.std(r)), 1e-300)
 
 
 def student_scale(r: Array, freedom: float) -> float:
-    """Scale of Student's distribution that fits the residuals best (a few steps of expectation-maximisation)."""
+    """Return the scale of Student's distribution that fits the residuals best (some expectation-maximisation steps)."""
     s = robust_std(r)
     for _ in range(8):
         s = math.sqrt(float(np.mean(student_weight(r / s, freedom) * r * r)))
@@ -97,17 +98,17 @@ def student_scale(r: Array, freedom: float) -> float:
 
 
 def student_weight(x: Array, freedom: float) -> Array:
-    """Weight of the square of each residual, in scales, in the likelihood's gradient."""
+    """Return the weight of the square of each residual, in scales, in the likelihood's gradient."""
     return (freedom + 1.0) / (freedom + x * x)
 
 
 DELAY = "skew"
-"""Name of the number in the vector by which the torque's column lies behind the torque that acted, s."""
+"""Name of the vector's number for the delay of the torque's column relative to the torque that acted, s."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is known beside the motion: a normal distribution of some numbers.
+    """Prior knowledge besides the motion: a normal distribution of some numbers.
 
     Attributes
     ----------
@@ -125,7 +126,7 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Criterion:
-    """What is minimised: the records' corrections behind a whitening filter, outliers weighed.
+    """The criterion to minimise: the records' corrections after a whitening filter, with outliers weighted down.
 
     Attributes
     ----------
@@ -133,13 +134,13 @@ class Criterion:
     whitening : array
         Coefficients of the filter.
     scale : float
-        Of Student's distribution, N·m; infinite for plain squares.
+        Scale of Student's distribution, N·m; infinite for plain squares.
     freedom : float
         Its degrees of freedom.
     prior : Prior, optional
-        Of some of the vector's numbers.
+        Prior of some of the vector's numbers.
     rough : float
-        N·m, about the scale of the noise, by which the prior counts beside plain squares.
+        Approximate scale of the noise, N·m, that weights the prior against plain squares.
     """
 
     records: Sequence[Prepared]
@@ -157,11 +158,11 @@ class Criterion:
         records: Sequence[Prepared], law: Law, vector: Vector, mechanics: MakeMechanics, prior: Prior | None = None,
         rough: float = 1.0,
     ) -> Criterion:  # fmt: skip
-        """Plain squares behind the first filter: for the search."""
+        """Return plain squares after the first filter, for the search."""
         return Criterion(records, law, vector, mechanics, FIRST, prior=prior, rough=rough)
 
     def corrections(self, u: Array) -> list[Array]:
-        """Torque that the model lacks on every record; not a number where the law refuses the parameters."""
+        """Return the torque that the model lacks on every record; NaN if the law refuses the parameters."""
         parameters = feasible(self.law, self.vector.law_parameters(u))
         if parameters is None:
             return [r.nothing() for r in self.records]
@@ -170,18 +171,18 @@ class Criterion:
         return [r.correction(axis, parameters, self.late(named, r)) for r in self.records]
 
     def late(self, named: Mapping[str, float], record: Prepared) -> float:
-        """Seconds by which a record's torque acted before it is taken to act, from its row to the next."""
+        """Return the seconds by which a record's torque acted before its assumed time, from its row to the next."""
         if DELAY not in named:
             return 0.0
         time = record.course.drive.time
         return named[DELAY] + 0.5 * float(time[1] - time[0])
 
     def white(self, u: Array) -> Array:
-        """The corrections behind the filter, shape (n,)."""
+        """Return the filtered corrections, shape (n,)."""
         return np.concatenate([whitened(self.whitening, e) for e in self.corrections(u)])
 
     def residuals(self, u: Array) -> Array:
-        """Numbers whose squares add up to the criterion: twice the negative logarithm of the likelihood."""
+        """Return the numbers whose squares add up to the criterion: twice the negative log likelihood."""
         r = self.white(u)
         if not math.isinf(self.scale):
             n = self.freedom
@@ -192,7 +193,7 @@ class Criterion:
         return np.concatenate([r, known * self.rough if math.isinf(self.scale) else known])
 
     def prior_seen(self, u: Array) -> Array:
-        """The numbers that the prior is about, shape (k,); not numbers where the law refuses the parameters."""
+        """Return the numbers of the prior, shape (k,); NaN if the law refuses the parameters."""
         assert self.prior is not None
         parameters = feasible(self.law, self.vector.law_parameters(u))
         if parameters is None:
@@ -200,12 +201,12 @@ class Criterion:
         return self.prior.seen(self.vector.named(u), parameters)
 
     def cost(self, u: Array) -> float:
-        """Sum of squares, infinite where it cannot be had."""
+        """Return the sum of squares, infinite if it is undefined."""
         r = self.residuals(u)
         return float(r @ r) if np.all(np.isfinite(r)) else math.inf
 
     def blocks(self, seconds: float) -> Array:
-        """Number of the stretch of time, so many seconds long, that every whitened correction lies in, shape (n,)."""
+        """Return the index of every whitened correction's segment of time with this length, shape (n,)."""
         rows: list[Any] = []
         first = 0
         for record in self.records:
@@ -217,43 +218,43 @@ class Criterion:
         return np.concatenate(rows)
 
     def squares(self) -> Squares:
-        """The residuals between the bounds of the vector."""
+        """Return the residuals with the bounds of the vector."""
         return Squares(self.residuals, self.vector.lower, self.vector.upper, DIFFERENCE, mapped)
 
     def search(self, u: Array) -> Secants:
-        """A descent that stands at u."""
+        """Return a descent that starts at u."""
         return Secants(self.squares(), u)
 
     def descend(self, u: Array, iterations: int, tolerance: float, jacobian_there: bool = True) -> Optimum:
-        """The minimum reached from u."""
+        """Return the minimum reached from u."""
         return descend(
             self.squares(), u, iterations=iterations, tolerance=tolerance, jacobian_there=jacobian_there
         )
 
     def adapted(self, u: Array) -> Criterion:
-        """The same with filter and scale that the corrections at u suggest."""
+        """Return the criterion with the filter and scale estimated from the corrections at u."""
         new = replace(self, whitening=autoregression(self.corrections(u), ORDER))
         return replace(new, scale=student_scale(new.white(u), self.freedom))
 
     def weighed(self, u: Array) -> Array:
-        """The corrections behind the filter in scales, times the square root of their weight, shape (n,)."""
+        """Return the filtered corrections in scales, times the square root of their weight, shape (n,)."""
         x = self.white(u) / self.scale
         return np.sqrt(student_weight(x, self.freedom)) * x
 
 
-# ---- how sure a minimum is ------------------------------------------------------------------------------------------
+# ---- uncertainty of a minimum ---------------------------------------------------------------------------------------
 
 
 def ridge_of(r: Array, size: int) -> Array:
-    """A coordinate that the data leave open is held within `REACH` of where it is, shape (p, p)."""
+    """Return the prior information that bounds undetermined coordinates to about `REACH`, shape (p, p)."""
     variance = float(r @ r) / max(r.size - size, 1)
     return variance / REACH**2 * np.eye(size)
 
 
 def perturbed_steps(criterion: Criterion, optimum: Optimum, rng: np.random.Generator, held: Array) -> Array:
-    """Mean square of the steps of Gauss and Newton from the minimum on records with the corrections as noise.
+    """Return the mean square of Gauss-Newton steps from the minimum on records with the corrections as noise.
 
-    `held`, shape (p, p), is the information that is there beside the records.
+    `held`, shape (p, p), is the information in addition to the records.
 
     Returns
     -------
@@ -277,7 +278,7 @@ def perturbed_steps(criterion: Criterion, optimum: Optimum, rng: np.random.Gener
 
 
 def random_signs(rng: np.random.Generator, time: Array) -> Array:
-    """A smooth Gaussian series of unit variance that forgets within `MEMORY`, shape (n,)."""
+    """Return a smooth Gaussian series of unit variance and correlation time `MEMORY`, shape (n,)."""
     samples = 0.5 * MEMORY / float(time[1] - time[0])
     smooth = np.exp(-2.0 * (math.pi * samples * np.fft.rfftfreq(time.size)) ** 2)
     x = np.fft.irfft(smooth * np.fft.rfft(rng.standard_normal(time.size)), time.size)
@@ -285,7 +286,7 @@ def random_signs(rng: np.random.Generator, time: Array) -> Array:
 
 
 def weighted(criterion: Criterion, optimum: Optimum) -> tuple[Array, Array]:
-    """Residuals and their Jacobian, each row times the square root of its weight at the minimum."""
+    """Return the residuals and their Jacobian, each row times the square root of its weight at the minimum."""
     n = criterion.freedom
     x = criterion.white(optimum.u) / criterion.scale
     # From the Jacobian of the transformed residuals back to that of the plain ones.

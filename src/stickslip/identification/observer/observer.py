@@ -1,9 +1,9 @@
-"""The observer of an axis: it holds a simulated axis to the measured motion, and tells what torque that takes.
+"""The observer of an axis: it makes a simulated axis follow the measured motion and returns the torque required.
 
-In fast motion a spring and a damper pull, slow enough that the axis moves by its model and not by the encoder's noise.
-In slow motion and at rest that would not do: where friction falls with velocity faster than the damping rises, a
-contact may stick or slip at one torque, and simulated and measured motion would part even under the true parameters.
-There a damper takes over that is part of the implicit step, as firm as the encoder knows the velocity.
+In fast motion a spring and a damper act, slow enough that the axis moves by its model and not by the encoder's noise.
+In slow motion and at rest that is insufficient: if friction falls with velocity faster than the damping rises, a
+contact may stick or slip at the same torque, and simulated and measured motion would diverge even with the true
+parameters. There a damper within the implicit step takes over, as firm as the encoder's velocity allows.
 """
 
 from __future__ import annotations
@@ -26,35 +26,36 @@ from stickslip.simulation.recorded_input.simulation import Course, Drive, Mechan
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LAG = 4.0
-"""Corner of the low-pass behind which the slow damper damps, in natural frequencies of the observer."""
+"""Corner of the slow damper's low-pass, in natural frequencies of the observer."""
 SLOW = 0.15
 """Part of the usual (RMS) speed below which the firm damper takes over."""
 CREEP = 0.01
-"""Part of it below which a contact may not slide far enough to forget how it was before."""
+"""Part of the usual speed below which a contact may not slide far enough to lose its memory."""
 GRASP = 0.6
-"""Samples within which it takes the measured velocity."""
+"""Samples within which the simulation reaches the measured velocity."""
 RETURNS = 0.5
-"""Rate at which the position is led back there, in natural frequencies."""
+"""Rate at which the firm damper corrects the position, in natural frequencies."""
 TOLERATED = 3e-3
-"""Part of friction that a wrong velocity may make it add."""
+"""Greatest torque due to a wrong velocity, part of friction."""
 LONGEST = 1e-3
-"""Longest step of the simulation, s, but for what equally spaced samples may differ by."""
+"""Longest step of the simulation, s, apart from the tolerance of equally spaced samples."""
 FINELY = 8.0
-"""Steps of a row that are enough where rows are long: no band of theirs is seen finer."""
+"""Steps per row that suffice for long rows, whose band is low."""
 FORGOTTEN = (8.0, 4.0)
-"""Periods of the observer's natural frequency after which little is left of how it began, where the axis slides; the
-second where the first leaves a segment longer than `SHORT`. Within an encoder's count nothing pulls: it takes many."""
+"""Periods of the observer's natural frequency after which its initial state is nearly forgotten in sliding; the second
+applies if the first gives a segment longer than `SHORT`. Within an encoder's count no spring acts, so many are
+required."""
 SHORT = 0.25
-"""Part of a record."""
+"""Longest segment that is acceptable, part of a record."""
 EXACT, ROUGH = 1e-8, 1e-6
-"""Roundings that leave a hundred-thousandth and a thousandth of the corrections: for results, and for searches, which
-take a fifth less time with it."""
+"""Rounding of the steps for corrections accurate to a hundred-thousandth (results) and to a thousandth (searches, which
+are faster with it)."""
 FEWEST = 32
-"""Corrections that a motion must leave."""
+"""Fewest corrections of a motion."""
 REMEMBERED = 64
-"""Corrections that are kept for who asks for the same values again."""
+"""Corrections that are cached for repeated values."""
 EDGE = 0.15
-"""s at both ends that filters spoil."""
+"""Time at both ends affected by filters, s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +65,8 @@ class Motion:
     Attributes
     ----------
     time, position, torque : array, shape (n,)
-        s, rad, N·m (m, N), the torque held until the next sample; a signal that the axis's ``drive_gain`` turns into
-        torque will do.
+        s, rad, N·m (m, N), the torque held until the next sample; a signal that the axis's ``drive_gain`` converts to
+        torque is also allowed.
     count : float
         Resolution of the position, rad (m); 0 for none.
     """
@@ -77,12 +78,12 @@ class Motion:
 
     @property
     def period(self) -> float:
-        """Time between samples, s."""
+        """Sample period, s."""
         return float(np.median(np.diff(self.time)))
 
     @cached_property
     def seen(self) -> SeenVelocity:
-        """Its velocity, as far as the encoder shows it."""
+        """Velocity from the encoder, with its uncertainty."""
         return seen_velocity(self.time, self.position, self.count)
 
 
@@ -98,11 +99,11 @@ class Prepared:
     known: dict[Any, Array] = field(default_factory=dict[Any, Array], init=False, repr=False)
 
     def correction(self, mechanics: Mechanics, parameters: Any, late: float = 0.0) -> Array:
-        """Torque that the model lacks, N·m, in the band, shape (m,); of the last few values it is remembered.
+        """Return the torque that the model lacks, N·m, in the band, shape (m,); recent results are cached.
 
-        `late` are the seconds by which the torque acted before its row, half a row of a held command not counted.
+        `late` is the time by which the torque acted before its row, s, without half a row of a held command.
         """
-        # A search stands where the one before ended, and another filter behind it asks for the same.
+        # A search starts where the one before stopped, and requests the same values after another filter.
         values = mechanics, late, *self.course.law.pack(parameters)
         if (found := self.known.get(values)) is None:
             found = self.shifted(late, mechanics).simulated(mechanics, parameters)
@@ -113,19 +114,19 @@ class Prepared:
         return found
 
     def simulated(self, mechanics: Mechanics, parameters: Any) -> Array:
-        """The same, simulated."""
+        """Simulate the correction."""
         raw = self.raw(mechanics, parameters)
         if not np.all(np.isfinite(raw)):
             return self.nothing()
         return np.array(self.low_pass(raw)[self.edge : -self.edge : self.stride])
 
     def raw(self, mechanics: Mechanics, parameters: Any) -> Array:
-        """Torque that the observer adds at every sample, N·m, shape (n,)."""
+        """Return the torque that the observer adds at every sample, N·m, shape (n,)."""
         found = self.segments.corrections(mechanics, parameters)
         return self.course.run(mechanics, parameters)[:, 3] if found is None else found
 
     def shifted(self, late: float, mechanics: Mechanics) -> Prepared:
-        """The same with the drive's signal so many seconds earlier."""
+        """Return the same motion with the drive's signal `late` s earlier."""
         if late == 0.0:
             return self
         drive = self.course.drive
@@ -134,12 +135,12 @@ class Prepared:
         return self.perturbed(before + mechanics.drive_gain * moved)
 
     def perturbed(self, torque: Array) -> Prepared:
-        """The same with this torque on the axis, N·m, shape (n,)."""
+        """Return the same motion with this torque on the axis, N·m, shape (n,)."""
         course = Course(self.course.law, replace(self.course.drive, disturbance=torque))
         return replace(self, course=course, segments=self.segments.perturbed(torque))
 
     def nothing(self) -> Array:
-        """Not a number, as many as there are corrections."""
+        """Return an array of NaN with the shape of the corrections."""
         return np.full(self.course.drive.time[self.edge : -self.edge : self.stride].shape, math.nan)
 
 
@@ -147,20 +148,20 @@ def prepare(
     motion: Motion, law: Law, inertia: float, friction: float, band: float, speed: float = 1.0, grasp: float = GRASP,
     rounding: float = EXACT,
 ) -> Prepared:  # fmt: skip
-    """Lay the observer out.
+    """Prepare the observer for a motion.
 
     Parameters
     ----------
     motion : Motion
     law : Law
     inertia, friction : float
-        About those of the axis: kg·m², and the Coulomb torque, N·m.
+        Approximate values of the axis: kg·m², and the Coulomb torque, N·m.
     band : float
-        Hz up to which corrections count.
+        Bandwidth of the corrections, Hz.
     speed : float
-        Its natural frequency in bands.
+        Natural frequency of the observer, in bands.
     grasp : float
-        Samples within which its firm damper takes the measured velocity; infinite for an observer without one.
+        Samples within which its firm damper reaches the measured velocity; infinite for an observer without one.
     rounding : float
         Part of the velocity, above 0.01 rad/s, to which its steps are solved.
 
@@ -197,7 +198,7 @@ def prepare(
 
 
 def in_segments(law: Law, drive: Drive, way: Array, period: float, rounding: float) -> Segments:
-    """The same followed in segments; `period` is that of the observer's natural frequency, in rows."""
+    """Return the motion in segments; `period` is that of the observer's natural frequency, in rows."""
     found: list[Segments] = []
     for periods in FORGOTTEN:
         warm = math.ceil(periods * period)
@@ -208,28 +209,28 @@ def in_segments(law: Law, drive: Drive, way: Array, period: float, rounding: flo
 
 
 def firmness(seen: SeenVelocity, firm: float, least: float, friction: float) -> Array:
-    """Damping of the firm damper, N·m·s/rad; 0 where the axis is fast, or its velocity too unsure for one."""
+    """Return the firm damper's damping, N·m·s/rad; 0 in fast motion, or if the velocity is too uncertain."""
     allowed = TOLERATED * friction / np.maximum(seen.doubt, 1e-300)
     damping = np.where(seen.doubt > 0.0, np.minimum(allowed, firm), firm)
     return np.where(slow(seen) & (damping > least), damping, 0.0)
 
 
 def slow(seen: SeenVelocity) -> Any:
-    """Where the axis is slower than `SLOW` of its usual speed, shape (n,)."""
+    """Return a mask of rows in which the axis is slower than `SLOW` of its usual speed, shape (n,)."""
     return np.abs(seen.velocity) < SLOW * float(np.sqrt(np.mean(seen.velocity**2)))
 
 
 def sliding(seen: SeenVelocity, firm: Array) -> Array:
-    """Which way the contact slides and forgets, +1 or -1, shape (n,); 0 where it may stick.
+    """Return the direction in which the contact slides and loses memory, +1 or -1, shape (n,); 0 where it may stick.
 
-    A soft observer may part from the motion where the axis is slow, a firm one holds it to all but a creep.
+    A soft observer may diverge from slow motion; a firm one follows all but a creep.
     """
     creeps = np.abs(seen.velocity) < CREEP * float(np.sqrt(np.mean(seen.velocity**2)))
     return np.where(creeps | (slow(seen) & (firm == 0.0)), 0.0, np.sign(seen.velocity))
 
 
 def forgotten(way: Array, warm: int) -> Any:
-    """Rows before which the axis has slid one way for so many rows, shape (n,)."""
+    """Return a mask of rows preceded by `warm` rows of sliding in one direction, shape (n,)."""
     slid = np.concatenate([[0.0], np.cumsum(way)])
     out = np.zeros(way.size, dtype=np.bool_)
     out[warm:] = np.abs(slid[warm:-1] - slid[: -warm - 1]) == warm
@@ -237,7 +238,7 @@ def forgotten(way: Array, warm: int) -> Any:
 
 
 def checked(motion: Motion, band: float) -> None:
-    """Refuse what the filters cannot work on."""
+    """Refuse a motion that the filters cannot process."""
     steps = np.diff(motion.time)
     if motion.time.size < 200 or not evenly_spaced(motion.time):
         raise InputError(

@@ -1,4 +1,4 @@
-"""The angle at which a pendulum hangs is known but for whole turns: the one nearest to where it moved is said."""
+"""The angle at which a pendulum hangs is determined up to whole turns: the one nearest to the motion is reported."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ TURN = 2.0 * math.pi
 
 
 def nearest(angle: float, position: Array) -> float:
-    """The angle, turned by whole turns to the middle of the positions; within half a turn of 0 where these go farther
-    than a turn."""
+    """Return the angle, shifted by whole turns to the middle of the positions.
+
+    It is within half a turn of 0 if the positions span more than a turn.
+    """
     low, high = float(np.min(position)), float(np.max(position))
     middle = 0.5 * (low + high) if high - low < TURN else 0.0
     return angle + TURN * round((middle - angle) / TURN)
 
 
 def hanging(sine: float, cosine: float, position: Array) -> tuple[float, float]:
-    """Amplitude and angle of sine · sin(q) + cosine · cos(q) = amplitude · sin(q - angle)."""
+    """Return amplitude and angle of sine · sin(q) + cosine · cos(q) = amplitude · sin(q - angle)."""
     return math.hypot(sine, cosine), nearest(math.atan2(-cosine, sine), position)
 
 
 def within_a_turn(estimates: Sequence[Estimate], position: Array) -> tuple[Estimate, ...]:
-    """The estimates, ``gravity_angle`` near the positions; an interval wider than a turn tells nothing."""
+    """Return the estimates with ``gravity_angle`` near the positions; wider than a turn it is not identified."""
     out: list[Estimate] = []
     for e in estimates:
         if e.name == "gravity_angle" and math.isfinite(e.value):

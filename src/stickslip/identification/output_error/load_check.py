@@ -1,9 +1,9 @@
-"""Whether records tell friction that grows with the load of the gearing from friction that does not.
+"""Whether records distinguish friction that grows with the gearing's load from friction that does not.
 
-With T = J a + T_outer + f sign(v) (1 + l |T|), and a drive that never brakes, |T| sign(v) is T itself, so that
-(1 - l f) T = J a + T_outer + f sign(v): greater J, T_outer and f do what l does, exactly at one speed and nearly so at
-all. What noise and rounding leave then decides, and the interval of a least-squares fit does not know it. So the
-load's effect is compared with what the other parameters explain of it, where the axis moves.
+With T = J a + T_outer + f sign(v) (1 + l |T|), and a drive that never brakes, |T| sign(v) is T itself, so (1 - l f) T =
+J a + T_outer + f sign(v): greater J, T_outer and f have the same effect as l, exactly at one speed and nearly at all.
+Noise and rounding then decide, which the interval of a least-squares fit does not include. The load's effect is
+therefore compared to the part of it that the other parameters explain in motion.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from stickslip.simulation.recorded_input.simulation import Mechanics
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LEAST = 0.1
-"""Part of the load's effect that nothing else explains, from which on it is told apart. Simulated axes of load_motor
-0.8 came out between 0.1 and 0.7 where that part was below 0.06, and within 6 % of 0.8 where it was above 0.14."""
+"""Least part of the load's effect that no other parameter explains, for it to be distinguished: below it, estimates of
+load_motor are biased."""
 MOVING = 0.05
-"""Of the usual (RMS) speed, from which on an axis counts as moving: reversals would pass for an effect of the load."""
+"""Least speed of a moving axis, part of the usual (RMS) speed: reversals would resemble an effect of the load."""
 SURE = 3.0
-"""Standard deviations by which a torque differs from 0 where it is taken as there."""
+"""Standard deviations by which a torque must differ from 0 to count as present."""
 OUTER = ("offset", "gravity_", "cos[", "sin[")
-"""Names of the torques from outside among the columns of the inverse dynamics."""
+"""Names of external torques among the columns of the inverse dynamics."""
 ADVICE = (
     "Record decelerations so hard that the drive brakes: only there load-dependent friction can be "
     f"distinguished. Without load_motor ({name_option('load', True)}) the other values hold at the load of "
@@ -38,14 +38,14 @@ ADVICE = (
 
 
 def own_part(inverse: InverseDynamics, mechanics: Mechanics) -> float:
-    """Part of the load's effect on friction that no other parameter has: norm of what is left over the whole norm.
+    """Return the part of the load's effect on friction that no other parameter explains: residual norm over norm.
 
     Parameters
     ----------
     inverse : InverseDynamics
-        Whose columns are the effects of the other parameters.
+        Its columns are the effects of the other parameters.
     mechanics : Mechanics
-        With load_motor and load_external: where both act, their sum may turn its sign.
+        With load_motor and load_external: if both act, their sum may change sign.
     """
     speed, torque = inverse.velocity, inverse.torque
     moving = np.abs(speed) > MOVING * float(np.sqrt(np.mean(speed**2)))
@@ -61,9 +61,9 @@ def own_part(inverse: InverseDynamics, mechanics: Mechanics) -> float:
 
 
 def tells_external(inverse: InverseDynamics) -> bool:
-    """Whether records show a constant outer torque's own share of the load: the torque is there, and the drive brakes.
+    """Return whether records determine the share of a constant outer torque in the load.
 
-    Where the drive never brakes, that share is one with the level of friction.
+    This requires such a torque and a drive that brakes: otherwise the share is equivalent to the level of friction.
     """
     if not inverse.has("offset"):
         return False
@@ -73,8 +73,10 @@ def tells_external(inverse: InverseDynamics) -> bool:
 
 
 def own_part_external(inverse: InverseDynamics, mechanics: Mechanics) -> float:
-    """As `own_part`, of the load that torques from outside make, with load_motor held: a constant one loads a drive
-    that never brakes as more friction would."""
+    """Return `own_part` of the load due to external torques, with load_motor held.
+
+    For a drive that never brakes, a constant external torque has the same effect as more friction.
+    """
     speed = inverse.velocity
     moving = np.abs(speed) > MOVING * float(np.sqrt(np.mean(speed**2)))
     outside = [i for i, n in enumerate(inverse.names) if n.startswith(OUTER)]
@@ -90,7 +92,7 @@ def own_part_external(inverse: InverseDynamics, mechanics: Mechanics) -> float:
 def judged_external(
     estimates: Sequence[Estimate], inverse: InverseDynamics | None, mechanics: Mechanics
 ) -> tuple[Estimate, ...]:
-    """The estimates; where the records do not tell load_external, neither it nor the torques of friction are."""
+    """Return the estimates; without load_external, neither it nor the torques of friction are identified."""
     own = own_part_external(inverse, mechanics) if inverse is not None else 0.0
     if own >= LEAST:
         return tuple(estimates)
@@ -109,10 +111,10 @@ def judged_external(
 def judged_load(
     estimates: Sequence[Estimate], inverse: InverseDynamics | None, mechanics: Mechanics
 ) -> tuple[Estimate, ...]:
-    """The estimates; where the records do not tell load_motor, neither it nor what goes with it is identified.
+    """Return the estimates; if load_motor is undetermined, neither it nor the parameters coupled to it are identified.
 
-    All torques and inertias go with it: they scale alike. With load_motor held, load_external alone goes with the level
-    of friction.
+    All torques and inertias are coupled to it, since they scale alike. With load_motor held, only the level of friction
+    is coupled to load_external.
     """
     names = {e.name for e in estimates}
     if "load_motor" not in names:

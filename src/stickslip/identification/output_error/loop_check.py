@@ -1,20 +1,17 @@
-"""Whether a controller that was given is the one that made a record: its gains, found from the record itself.
+"""Check of a given controller against a record: its gains, estimated from the record itself.
 
-A linear controller's output is linear in its gains, u = kp e + ki (integral of e) + kr dr - kd dy, so that least
-squares of the recorded signal over reference and position give them, whatever the axis is. Four things would mislead:
+A linear controller's output is linear in its gains, u = kp e + ki (integral of e) + kr dr - kd dy, so least squares of
+the recorded signal over reference and position determine them, whatever the axis. Four effects are allowed for:
 
-- Noise and rounding of the position make the gain on the velocity look smaller (errors in variables:
-  ``fuller1987``). Means over segments of rows are fitted, so long that it does not matter; what
-  is left counts as uncertain.
-- A signal that is recorded some rows later takes from the gain on the velocity. The delay is the one that fits best.
-- A reference that is recorded some rows late or early looks like another gain on its velocity: gains that explain the
-  signal with the reference shifted are not doubted.
+- Noise and rounding of the position reduce the estimated gain on the velocity (errors in variables: ``fuller1987``).
+Means over segments long enough to make this negligible are fitted; the rest counts as uncertainty.
+- A signal recorded some rows later reduces the gain on the velocity. The delay with the best fit is used.
+- A reference recorded some rows late or early resembles another gain on its velocity: gains that explain the signal
+with a shifted reference are accepted.
 - Residuals are correlated: the intervals leave segments of time out (`stickslip.identification.fit.jackknife`).
 
-`benchmarks/loop_doubted.py`, seeds 20 to 49: of 450 records with the right gains 2 were doubted without the
-controller's period, 1 with it, all with a fifth of its rows; of 720 with all rows and 16384 counts or more, a kd of
-twice the true one, a kp 41 % above it, and kr left out or put in were doubted in 717. A filter of the velocity
-that was not given is another controller: one at 100 Hz is doubted in some records, slower ones in most.
+A filter of the velocity that was not given is another controller; a slow one usually causes a warning. False warnings
+and missed ones are counted by `benchmarks/loop_doubted.py`.
 """
 
 from __future__ import annotations
@@ -37,50 +34,50 @@ from stickslip.simulation.recorded_input.simulation import Loop, control_signal
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Means = tuple[Array, Array, Array]
-"""Columns beside a constant, signal, time."""
+"""Columns besides a constant, signal, time."""
 
 GAINS = ("kp", "ki", "kr", "kd")
 DELAYS = range(-2, 5)
-"""Rows by which the recorded signal may follow the position."""
+"""Delays of the recorded signal relative to the position, rows."""
 LATE = (0, 1, -1, 2, -2)
-"""Rows by which the recorded reference may be late, likeliest first."""
+"""Delays of the recorded reference, rows, the likeliest first."""
 CLEARLY = 0.5
-"""Part of the squares left with the reference as it is that a shifted one may leave for the shift to be believed."""
+"""Greatest ratio of squared residuals, shifted to unshifted, for a shift to be accepted."""
 LENGTHS = (1, 2, 4, 8, 16, 32)
-"""Rows of which means are taken."""
+"""Rows per mean."""
 NOISY = 0.01
-"""Part of the variance that only the velocity has which may be noise: it lowers the gain by so much."""
+"""Greatest share of noise in the variance that only the velocity explains: it lowers the gain by as much."""
 BLOCK = 0.25
-"""s of a segment that is left out."""
+"""Length of a segment that is left out, s."""
 FEWEST = 100
-"""Means needed."""
+"""Fewest means."""
 CUT = 0.98
-"""Part of the limit, or of what is exceeded in 0.1 % of the rows, from which on a signal counts as cut off."""
+"""Part of the limit, or of the level exceeded in 0.1 % of the rows, above which a signal counts as cut off."""
 EXPLAINED, MISSED, WORSE = 0.3, 0.05, 2.0
-"""Parts of the signal that the shown gains may leave, and that the given ones must leave, so much more than those."""
+"""Residual parts of the signal: greatest with the estimated gains; least with the given ones; least ratio of both."""
 OTHER_LOOP = "other-loop"
 OTHER, FELT = 0.1, 0.03
-"""Relative difference of a gain, and its part of the signal, from which on it is told."""
+"""Relative difference of a gain, and its part of the signal, above which it is reported."""
 
 
 @dataclass(frozen=True, eq=False)
 class ShownGains:
-    """Gains that a record shows, beside those that were given.
+    """Gains that a record shows, together with those that were given.
 
     Attributes
     ----------
     given, values, half_widths : array, shape (4,)
-        Of `GAINS`, in the unit of the drive's signal per rad (m); half-widths of 95 % intervals.
+        Values for `GAINS`, in the unit of the drive's signal per rad (m); half-widths of 95 % intervals.
     parts : array, shape (4,)
-        Root mean square of what each gain multiplies, over that of the signal.
+        Root mean square of each gain's column, relative to that of the signal.
     left, missed : float
-        Parts of the signal (root mean squares) that the shown gains and the given ones do not explain, each with the
-        reference shifted by as many rows as suits them.
+        Unexplained parts of the signal (root mean squares) with the estimated gains and with the given ones, each with
+        the best shift of the reference.
     late : int
-        Rows by which the reference must be recorded late for the given gains to explain the signal; 0 where they do
-        so without, or no such shift helps.
+        Delay of the recorded reference with which the given gains explain the signal, rows; 0 if none is needed or
+        helps.
     cascade : bool
-        Whether a cascade was given: the gains are those of the PID that it is (`as_pid`).
+        Whether a cascade was given: the gains are those of its equivalent PID (`as_pid`).
     """
 
     given: Array
@@ -94,11 +91,11 @@ class ShownGains:
 
     @property
     def turned(self) -> bool:
-        """Whether every gain that was given is shown with the other sign."""
+        """Whether every given gain is estimated with the opposite sign."""
         return bool(np.any(self.given > 0.0) and np.all(self.values[self.given > 0.0] < 0.0))
 
     def differing(self) -> list[str]:
-        """Each gain that is clearly another than given, in words; empty where the given ones explain the signal."""
+        """Describe each gain that clearly differs from the given one; empty if the given ones explain the signal."""
         if self.late or self.left > EXPLAINED or self.missed < bound(self.left):
             return []
         shown = np.maximum(self.values, 0.0)
@@ -118,19 +115,21 @@ class ShownGains:
 
 
 def bound(left: float) -> float:
-    """Part of the signal that gains may leave where the best ones leave so much."""
+    """Return the acceptable residual part of the signal if the best gains have this one."""
     return max(MISSED, WORSE * left)
 
 
 def doubted_loops(experiments: Sequence[Experiment], gain: float = 1.0) -> list[str]:
-    """A sentence for each record that clearly was made by other gains than given, or whose reference is recorded rows
-    late or early; `gain` as in `shown_gains`."""
+    """Return a warning for each record of another loop, or with a delayed or early reference.
+
+    `gain` is that of `shown_gains`.
+    """
     found = [(experiment.name, shown_gains(experiment, gain)) for experiment in experiments]
     return [said for name, shown in found if shown is not None and (said := doubt(name, shown))]
 
 
 def doubt(name: str, shown: ShownGains) -> str:
-    """What is to be said of a record's loop; empty where nothing is."""
+    """Return the warning about a record's loop; empty without one."""
     if shown.late:
         rows = f"{abs(shown.late)} row{'s' if abs(shown.late) > 1 else ''} {'late' if shown.late > 0 else 'early'}"
         return f"{name}: the reference seems recorded {rows}; so shifted, the loop given makes the recorded signal."
@@ -152,7 +151,7 @@ def doubt(name: str, shown: ShownGains) -> str:
 
 
 def shown_gains(experiment: Experiment, gain: float = 1.0) -> ShownGains | None:
-    """Gains of the controller that made a record, by least squares.
+    """Estimate the gains of the controller that made a record, by least squares.
 
     Parameters
     ----------
@@ -164,7 +163,7 @@ def shown_gains(experiment: Experiment, gain: float = 1.0) -> ShownGains | None:
     Returns
     -------
     ShownGains or None
-        None where the record lacks one of these, is too short, or the loop is no such sum.
+        None if the record lacks one of these or is too short, or the loop is not such a sum.
     """
     if experiment.drive is None or experiment.reference is None or experiment.loop is None:
         return None
@@ -198,8 +197,10 @@ def shown_gains(experiment: Experiment, gain: float = 1.0) -> ShownGains | None:
 
 
 def as_pid(loop: Loop) -> Loop | Gains | None:
-    """What has the gains of a sum: the loop itself, or the PID that a cascade is; None where that has one more gain, on
-    the position itself."""
+    """Return the loop itself, or a cascade's equivalent PID.
+
+    None if the cascade has one more gain, on the position itself.
+    """
     if loop.kv == 0.0:
         return loop
     if loop.kvi != 0.0 and loop.feed != 1.0:
@@ -208,43 +209,43 @@ def as_pid(loop: Loop) -> Loop | Gains | None:
 
 
 def shifted(experiment: Experiment, late: int) -> Experiment:
-    """The same with the reference that many rows earlier."""
+    """Return the experiment with the reference `late` rows earlier."""
     assert experiment.reference is not None
     rows = np.clip(np.arange(experiment.time.size) + late, 0, experiment.time.size - 1)
     return replace(experiment, reference=experiment.reference[rows])
 
 
 def delayed(experiment: Experiment, columns: Array, length: int, factor: float) -> list[Means]:
-    """Means with the signal each of the `DELAYS` later, without a factor on it."""
+    """Return the means with the signal delayed by each of `DELAYS`, divided by `factor`."""
     tries = [means(experiment, columns, length, delay) for delay in DELAYS]
     return [(x, u / factor, time) for x, u, time in tries]
 
 
 def best_of(tries: Sequence[Means]) -> Means:
-    """Those in which gains explain most."""
+    """Return the means in which gains explain most."""
     return min(tries, key=lambda t: residual(t[0], t[1]))
 
 
 def likeliest(tries: Mapping[int, Sequence[Means]]) -> int:
-    """Rows by which the reference is late: 0 unless others leave clearly less, as kr stands for them nearly."""
+    """Return the reference's delay, rows: 0 unless another has a clearly smaller residual (kr nearly replaces it)."""
     left = {late: residual(*best_of(some)[:2]) for late, some in tries.items()}
     least = min(left, key=lambda row: left[row])
     return least if left[least] < CLEARLY * left[0] else 0
 
 
 def residual(x: Array, u: Array) -> float:
-    """Mean square of what no gains explain."""
+    """Return the mean square that no gains explain."""
     return float(np.mean((u - x @ solved(x, u)) ** 2))
 
 
 def unexplained(x: Array, u: Array, given: Array) -> float:
-    """Part of a signal that gains leave, but for a constant."""
+    """Return the part of a signal that gains do not explain, apart from a constant."""
     missed = u - x[:, :-1] @ given
     return rms(missed - np.mean(missed)) / max(rms(u), 1e-300)
 
 
 def columns_of(experiment: Experiment, loop: Loop) -> Array:
-    """What each gain multiplies, shape (rows, 4): the controller with this gain 1 and no other."""
+    """Return the column of each gain, shape (rows, 4): the controller with this gain 1 and no other."""
     assert experiment.reference is not None
     plain = Loop(velocity_span=loop.velocity_span, filter=loop.filter)
     columns = np.column_stack([
@@ -252,14 +253,14 @@ def columns_of(experiment: Experiment, loop: Loop) -> Array:
         for name in GAINS
     ])  # fmt: skip
     if 0.0 < loop.period < 0.75 * experiment.period:
-        # It acts between the rows too, so that its velocities are those at a row, not the mean until then.
+        # It also acts between rows, so its velocities are those at a row, not the mean up to it.
         columns[:, GAINS.index("kr")] = np.gradient(experiment.reference, experiment.time)
         columns[:, GAINS.index("kd")] = -np.gradient(experiment.position, experiment.time)
     return columns
 
 
 def means(experiment: Experiment, columns: Array, length: int, delay: int) -> Means:
-    """Columns beside a constant, signal and time, as means over `length` rows, where nothing is cut off."""
+    """Return columns with a constant, signal and time, as means over `length` rows without cut-off values."""
     assert experiment.drive is not None
     assert experiment.loop is not None
     size = np.abs(experiment.drive)
@@ -274,7 +275,7 @@ def means(experiment: Experiment, columns: Array, length: int, delay: int) -> Me
 
 
 def with_intervals(x: Array, u: Array, time: Array, velocity_noise: float) -> tuple[Array, Array]:
-    """Gains and the half-widths of their 95 % intervals, each of shape (4,)."""
+    """Return the gains and the half-widths of their 95 % intervals, each of shape (4,)."""
     kd, count = GAINS.index("kd"), len(GAINS)
     scale = scales(x)
     values = solved(x, u)
@@ -283,7 +284,7 @@ def with_intervals(x: Array, u: Array, time: Array, velocity_noise: float) -> tu
     freedom = [max(spread.freedom(row) - 1.0, 1.0) for row in np.eye(count + 1)]
     std = np.sqrt(np.diag(spread.covariance)) / scale
     half: Array = np.array([student_quantile(n) for n in freedom]) * std
-    # Without the noise of the velocity in the normal equations they would be these (``fuller1987``).
+    # The estimate with the velocity's noise removed from the normal equations (``fuller1987``).
     normal = (x / scale).T @ (x / scale) / u.size
     own = own_variance(x, kd)
     normal[kd, kd] -= min(velocity_noise, 0.99 * own) / scale[kd] ** 2
@@ -294,28 +295,28 @@ def with_intervals(x: Array, u: Array, time: Array, velocity_noise: float) -> tu
 
 
 def own_variance(x: Array, place: int) -> float:
-    """Mean square of what a column has that no combination of the others has."""
+    """Return the mean square of a column's part that no combination of the others explains."""
     others = np.delete(x, place, axis=1)
     return float(np.mean((x[:, place] - others @ solved(others, x[:, place])) ** 2))
 
 
 def solved(x: Array, u: Array) -> Array:
-    """Least squares of u over columns of very different sizes."""
+    """Solve least squares of u over columns of very different sizes."""
     scale = scales(x)
     return np.asarray(np.linalg.lstsq(x / scale, u, rcond=None)[0] / scale, dtype=np.float64)
 
 
 def scales(x: Array) -> Array:
-    """Root mean square of every column; 1 where it is 0."""
+    """Return the root mean square of every column; 1 if it is 0."""
     size = np.sqrt(np.mean(x**2, axis=0))
     return np.where(size > 0.0, size, 1.0)
 
 
 def rms(x: Array) -> float:
-    """Root mean square."""
+    """Return the root mean square."""
     return math.sqrt(float(np.mean(x * x)))
 
 
 def position_noise(position: Array) -> float:
-    """Standard deviation of a position's noise, rad (m): that of its rounding, or what third differences show."""
+    """Return the standard deviation of a position's noise, rad (m): from its rounding or third differences."""
     return max(white_std(position), encoder_step(position) / math.sqrt(12.0))

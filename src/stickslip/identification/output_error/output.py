@@ -29,18 +29,18 @@ from stickslip.machines.servo import ServoAxis
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TOLERANCE, DIFFERENCE = 1e-5, 1e-4
-"""Of the last descent: relative decrease of the sum of squares at which it ends, and differences of coordinates."""
+"""Last descent: relative decrease of the sum of squares at which it stops, and step of the coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
 class OutputError(FittedAxis):
-    """A fitted axis and what the records say about each of its parameters.
+    """A fitted axis with the uncertainty of each of its parameters.
 
     Attributes
     ----------
     fit : Fit
     errors : mapping of str to float
-        Of the records fitted: ``position_relative``, ``drive_relative`` (norms of misfit over norms of signal),
+        Errors on the fitted records: ``position_relative``, ``drive_relative`` (norms of misfit over norms of signal),
         ``position_mean_absolute``, ``position_rms``.
     """
 
@@ -49,7 +49,7 @@ class OutputError(FittedAxis):
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
-        """Estimates with intervals and verdicts, units of the axis's own system."""
+        """Estimates with intervals and verdicts, in the units of the axis's own system."""
         return tuple(self._shown(e) for e in self.fit.estimates)
 
     def _shown(self, e: Estimate) -> Estimate:
@@ -81,17 +81,18 @@ def output_error(
     experiments : sequence of Experiment
     axis : ServoAxis
     law : Law
-        Any; a user's own from its file.
+        Any law, including a user's own from its file.
     first : InverseDynamics or None
-        Where the search starts; None where `values` give inertia and the law's parameters.
+        Start of the search; None if `values` give inertia and the law's parameters.
     free, frozen : sequence of str
-        Names beyond the usual: inertia, offset, what `extras` adds and the law are free, except for shape factors
-        with a default value (``delta_s``); ``drive_gain``, ``back_emf``, ``backlash``, ``controller_gain`` are frozen.
+        Names besides the default: inertia, offset, the parameters of `extras` and the law are free, except for shape
+        factors with a default value (``delta_s``); ``drive_gain``, ``back_emf``, ``backlash``, ``controller_gain`` are
+        frozen.
     values : mapping
-        Starting values, or those that frozen parameters have.
+        Starting values, or the values of frozen parameters.
     extras : Extras
     robust : bool
-        Outliers count linearly.
+        Whether outliers count linearly.
     profiles : bool
         Follow the profile likelihood for the intervals (slow); otherwise they come from the covariance.
 
@@ -109,9 +110,9 @@ def output_error(
 
 
 def judged(found: FittedAxis, profiles: bool = False) -> OutputError:
-    """The last descent, and what it says about every parameter."""
+    """Run the last descent and judge every parameter."""
     problem, (u, _) = found.problem, descended(found.problem, found.u, TOLERANCE, DIFFERENCE)
-    # Residuals of one time lie side by side, so that a lag counts as many of them as there are signals.
+    # Residuals of one time are adjacent, so a lag counts as many of them as there are signals.
     width = len(problem.signals)
     residual = problem.residuals(u).reshape(-1, width)
     lags = width * max(correlation_lags(residual[:, i]) for i in range(width)) + width - 1
@@ -125,10 +126,10 @@ def judged(found: FittedAxis, profiles: bool = False) -> OutputError:
 
 
 def scales_of(problem: Problem, u: Array) -> dict[str, float]:
-    """What the half-width of each signed parameter is compared with.
+    """Return the scale for the half-width of each signed parameter.
 
-    Torques with the law's own at slow motion; an angle has no relative width, and is compared with a radian (a
-    position on a linear axis with the range travelled), shares with the whole.
+    Torques are compared to the law's own in slow motion; an angle has no relative width and is compared to a radian (a
+    position on a linear axis to the range travelled), shares to the whole.
     """
     speeds = np.concatenate([np.abs(np.diff(t.position) / np.diff(t.time)) for t in problem.experiments])
     torque = level_of(problem.law, problem.model(u).parameters, 0.1 * float(np.sqrt(np.mean(speeds**2))))

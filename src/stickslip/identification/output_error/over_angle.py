@@ -1,8 +1,8 @@
-"""The torque over the angle from the records of an axis: rows of gross sliding are the places of a map.
+"""The torque over the angle from the records of an axis: rows of gross sliding are the points of a map.
 
-Waves over the angle are fitted together with inertia and friction's curve; orders are chosen by cross-validation on
-whole sectors, as from a standstill map (`stickslip.identification.cogging`). The map
-is then taken out of the recorded torque, so that the axis is identified without it.
+Waves over the angle are fitted together with inertia and the friction curve; orders are chosen by cross-validation on
+whole sectors, as for a standstill map (`stickslip.identification.cogging`). The map is then subtracted from the
+recorded torque, and the axis is identified without it.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ from stickslip.machines.servo import ServoAxis
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 FALLS = np.array([0.03, 0.1])
-"""Parts of the highest speed over which friction may fall; farther it is hardly told from viscous friction."""
+"""Velocities of friction's fall, parts of the highest speed; a faster one resembles viscous friction."""
 SECTORS = 12
-"""Of a turn, each of which must be passed in both directions."""
+"""Sectors of a turn, each of which must be passed in both directions."""
 RESOLVED = 1.0
-"""Phase of a wave (rad) that passes within the window's width, up to which a row shows it."""
+"""Greatest phase of a wave (rad) that passes within the window's width for a row to resolve it."""
 SLOWER = 0.25
-"""Part of the rows that must show the highest order tried."""
+"""Part of the rows that must resolve the highest order tried."""
 USUAL = 24
-"""Highest order that must show: slots of a usual motor. A faster record is not asked."""
+"""Highest order that must be resolved: slots of a usual motor. A faster record is refused."""
 INDEPENDENT = 1e-2
-"""Of the largest singular value: columns below say the same as others."""
+"""Part of the largest singular value below which columns are dependent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,28 +62,28 @@ class SlidingPlaces(Places):
     Attributes
     ----------
     others : array, shape (n, k)
-        What else their torque may hold.
+        Columns of other torque components.
     """
 
     others: Array
 
     @property
     def beside(self) -> Array:
-        """Columns of what else the torque may hold, shape (n, k)."""
+        """Columns of other torque components, shape (n, k)."""
         return self.others
 
     def motion(self, orders: Sequence[float], late: float = 0.0) -> Array:
-        """Velocity and acceleration, which the windows free of noise, `late` s before each place, shape (n, 2)."""
+        """Return velocity and acceleration, denoised by the windows, `late` s before each place, shape (n, 2)."""
         return np.column_stack([self.velocity - late * self.acceleration, self.acceleration])
 
     def damping(self, order: float) -> Array:
-        """What the window leaves of a wave of this order, shape (n,)."""
+        """Return the window's attenuation of a wave of this order, shape (n,)."""
         return np.exp(-0.5 * (order * self.width) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
 class OverAngle:
-    """A map that the records of an axis show, and what it was found from."""
+    """A map from the records of an axis, with its source."""
 
     found: PositionMap
     estimates: tuple[Estimate, ...]
@@ -92,10 +92,10 @@ class OverAngle:
     notes: tuple[str, ...]
     pictures: tuple[Picture, ...]
     skew: float
-    """s by which the torque's column lies behind the torque that acted."""
+    """Delay of the torque's column relative to the torque that acted, s."""
 
     def taken_out_of(self, experiment: Experiment, axis: ServoAxis) -> Experiment:
-        """The experiment without the map's torque in the drive's signal."""
+        """Return the experiment without the map's torque in the drive's signal."""
         gain, _ = axis.drive_gains(experiment.quantity)
         factor = gain * (np.ones(experiment.time.size) if experiment.supply is None else experiment.supply)
         acted = experiment.time - self.skew
@@ -106,7 +106,7 @@ class OverAngle:
         return replace(experiment, drive=experiment.signal() - own)
 
     def joined_to(self, axis: Identification) -> Identification:
-        """The axis's result with the map's numbers, notes and pictures."""
+        """Return the axis's result with the map's numbers, notes and pictures."""
         count, more = len(axis.estimates), len(self.estimates)
         correlation = np.eye(count + more)
         correlation[:count, :count] = axis.correlation
@@ -127,22 +127,22 @@ class OverAngle:
 def over_angle(
     experiments: Sequence[Experiment], axis: ServoAxis, skew: float | None, estimate: EstimateSliding
 ) -> OverAngle:
-    """The map over the angle that the records show.
+    """Identify the map over the angle from the records.
 
     Parameters
     ----------
     experiments : sequence of Experiment
-        With the drive's signal; angles in rad, the same zero in all.
+        With the drive's signal; angles in rad, with the same zero in all.
     axis : ServoAxis
     skew : float or None
-        s by which the torque's column lies behind the torque that acted, where it is known.
+        Delay of the torque's column relative to the torque that acted, s, if it is known.
     estimate : callable
         `stickslip.identification.sliding.estimate_sliding`, or a memo of it.
 
     Raises
     ------
     InputError
-        If the records show none, with the reason.
+        If the records show no map, with the reason.
     """
     if axis.motion != "rotary":
         raise InputError("the positions are lengths; give the motor's angle")
@@ -168,7 +168,7 @@ def over_angle(
             f"no order up to {orders.count} is more than chance ({choice.nothing[1]:.3g} N·m RMS about inertia and "
             "friction)"
         )
-    choice = replace(choice, table=(math.inf, math.inf))  # inertia and friction stand beside waves alone
+    choice = replace(choice, table=(math.inf, math.inf))  # Inertia and friction are fitted with waves only.
     bounds = float(places.angle.min()), float(places.angle.max())
     the_map = map_of(found, places, "N·m", choice, bounds)
     even = sum(part == "even" for part, _ in terms)
@@ -184,7 +184,7 @@ def over_angle(
 
 
 def places_of(sliding: SlidingPosterior, axis: ServoAxis) -> SlidingPlaces:
-    """The rows of the narrowest windows, with what friction and inertia may be beside Coulomb's level and slope."""
+    """Return the rows of the narrowest windows, with friction and inertia terms besides Coulomb's level and slope."""
     rows = sliding.rows
     width = min(b.width for b in rows.blocks)
     narrow = np.isin(rows.block, [i for i, b in enumerate(rows.blocks) if b.width == width])
@@ -210,7 +210,7 @@ def places_of(sliding: SlidingPosterior, axis: ServoAxis) -> SlidingPlaces:
 
 
 def independent(core: Array, others: Array) -> Array:
-    """What columns hold beside others, as a basis whose columns have mean square 1."""
+    """Return the part of columns that is independent of `core`, as a basis with mean square 1."""
     basis, _ = np.linalg.qr(core / np.maximum(np.linalg.norm(core, axis=0), 1e-300))
     size = np.linalg.norm(others, axis=0)
     own = others[:, size > 0.0] / size[size > 0.0]
@@ -219,7 +219,7 @@ def independent(core: Array, others: Array) -> Array:
 
 
 def refuse_narrow(places: Places) -> None:
-    """Refuse less than a turn each way."""
+    """Refuse motion of less than a turn in each direction."""
     low, high = float(places.angle.min()), float(places.angle.max())
     if high - low < ROUND:
         raise InputError(
@@ -236,7 +236,7 @@ def refuse_narrow(places: Places) -> None:
 
 
 def orders_of(places: Places) -> Orders:
-    """The orders that the slower rows resolve."""
+    """Return the orders that the slower rows resolve."""
     slow = float(np.quantile(places.width, SLOWER))
     highest = int(min(HIGHEST, RESOLVED / max(slow, 1e-12)))
     if highest < USUAL:
@@ -250,7 +250,7 @@ def orders_of(places: Places) -> Orders:
 
 
 def without_motion(places: Places, found: Fit, moving: Sequence[str]) -> Places:
-    """Only levels and waves in the torque, as a picture over the angle shows them."""
+    """Return the places with only levels and waves in the torque, as in a picture over the angle."""
     moved = columns(places, (), moving)[:, 2:]
-    # In long strokes columns of the swing follow, which a picture leaves in.
+    # For long strokes, columns of the swing follow, which a picture keeps.
     return replace(places, torque=places.torque - moved @ found.values[2 : 2 + moved.shape[1]])

@@ -1,4 +1,4 @@
-"""The plain inverse dynamics as an identification of its own: ``--inverse``."""
+"""The plain inverse dynamics as an identification: ``--inverse``."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from stickslip.simulation.recorded_input.simulation import Mechanics
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 POSITIVE = ("inertia", "fc", "sigma2", "gravity")
-"""Beginnings of the names of numbers that are greater than 0; the angle of a pendulum is none."""
+"""Starts of the names of positive numbers, except the angle of a pendulum."""
 
 
 OTHER_CORNERS = (0.5, 0.7, 1.4)
-"""Times the corner of the low-pass at which the equations are solved again: what values change by, it takes from ramps
-and reversals."""
+"""Factors on the low-pass corner at which the equations are solved again: the change of a value measures its dependence
+on ramps and reversals."""
 
 
 def at_other_corners(
     found: InverseDynamics, experiments: Sequence[Experiment], axis: ServoAxis, harmonics: int = 0
 ) -> list[InverseDynamics]:
-    """The inverse dynamics with the low-pass at other corners, those that the records allow."""
+    """Return the inverse dynamics with the low-pass at other corners, where the records allow it."""
     out: list[InverseDynamics] = []
     for times in OTHER_CORNERS:
         try:
@@ -51,13 +51,12 @@ def inverse_identification(
     validation: Sequence[Experiment] = (),
     others: Sequence[InverseDynamics] = (),
 ) -> Identification:
-    """The inverse dynamics as an `Identification`, its friction as the law ``coulomb``.
+    """Return the inverse dynamics as an `Identification` with friction as the law ``coulomb``.
 
-    Per direction the law is asymmetric, unless a constant torque above the friction acts along: then it has the mean of
-    both directions, and the constant torque half of their difference. Intervals hold the correlation of the residuals
-    and what the values change by with the corner of the low-pass (`others`, from `at_other_corners`), as between-fit
-    variance (DerSimonian and Laird 1986). `validation` records give the held-out error.
-    """
+    Per direction the law is asymmetric, unless a constant torque above friction acts: then it has the mean of both
+    directions, and the constant torque is half of their difference. Intervals include the correlation of the residuals
+    and the change of the values with the low-pass corner (`others`, from `at_other_corners`) as between-fit variance
+    (DerSimonian and Laird 1986). `validation` records give the held-out error."""
     model, mechanics = parts_of(found)
     names, units, values, covariance = of_the_model(found, model)
     for other in others:
@@ -89,8 +88,11 @@ def inverse_identification(
 def of_the_model(
     found: InverseDynamics, model: Model
 ) -> tuple[list[str], list[str], Array, Array]:  # fmt: skip
-    """Names, units, values and covariance of the numbers as the model has them: ``sigma2`` for ``fv``, those of a
-    direction or of both, and a pendulum's gravity as its amplitude and the angle at which it hangs."""
+    """Return names, units, values and covariance of the numbers as the model defines them.
+
+    ``sigma2`` stands for ``fv``, of one or both directions; gravity is an amplitude and the angle at which the pendulum
+    hangs.
+    """
     row = dict(zip(found.names, np.eye(len(found.names)), strict=True))
     own: dict[str, Array] = {"inertia": row["inertia"]}
     if not found.has("fc_plus"):
@@ -105,7 +107,7 @@ def of_the_model(
         }
         own |= {"offset": 0.5 * (row["fc_plus"] - row["fc_minus"])}
     if found.has("gravity_sin"):
-        # Their values are not linear in these, but what they change by is.
+        # The values are not linear in these, but small changes are.
         s, c = found["gravity_sin"], found["gravity_cos"]
         size = max(math.hypot(s, c), 1e-300)
         own["gravity"] = (s * row["gravity_sin"] + c * row["gravity_cos"]) / size
@@ -122,12 +124,12 @@ def of_the_model(
 
 
 def pendulum_of(found: InverseDynamics) -> tuple[float, float]:
-    """Amplitude of gravity, N·m, and the angle at which the pendulum hangs, rad."""
+    """Return the amplitude of gravity, N·m, and the angle at which the pendulum hangs, rad."""
     return hanging(found["gravity_sin"], found["gravity_cos"], found.position)
 
 
 def parts_of(found: InverseDynamics) -> tuple[Model, Mechanics]:
-    """Friction and what is beside it: inertia, constant torque, gravity."""
+    """Return the friction law and the mechanics: inertia, constant torque, gravity."""
     each = [found[n] for n in ("fc_plus", "fc_minus")] if found.has("fc_plus") else []
     offset = found.offset
     if each and min(each) >= 0.0:

@@ -1,8 +1,8 @@
-"""Output error of an axis: simulate every record, compare with what was measured.
+"""Output error of an axis: simulate every record and compare it to the measurement.
 
-Closed loops are simulated with their controller, so that an unstable or drifting motion stays with the record
-(Gautier, Janot and Vandanjon 2013); a record without a known controller is simulated with its recorded drive and a
-slow observer that pulls the axis to the measured position, and the misfit is what the observer has to correct.
+Closed loops are simulated with their controller, which keeps an unstable or drifting motion at the record (Gautier,
+Janot and Vandanjon 2013); a record without a known controller is simulated with its recorded drive and a slow observer
+that pulls the axis to the measured position, and the misfit is the observer's correction.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 OBSERVER_HZ = 1.0
 """Natural frequency of the observer on a record without a known controller."""
-MAX_STEP = 1e-3  # s, where the search starts
+MAX_STEP = 1e-3  # s, at the start of the search
 STEP_ERROR, HALVINGS = (
     0.1,
     2,
@@ -38,7 +38,7 @@ SIGNALS = ("drive", "position")
 def mechanics_parameters(
     axis: ServoAxis, quantity: str, values: Mapping[str, float], harmonics: int, friction_harmonics: int
 ) -> list[Parameter]:
-    """Everything but the law as parameters, at given or neutral values."""
+    """Return all parameters except the law's, at given or neutral values."""
     gain, loss = axis.drive_gains(quantity)
     torque = axis.unit("N·m")
     described = [
@@ -71,7 +71,7 @@ def mechanics_parameters(
 
 
 def mechanics_of(named: Mapping[str, float], harmonic_period: float) -> Mechanics:
-    """The axis at named values."""
+    """Return the mechanics at named values."""
     torque = tuple(
         (named[f"cos[{i}]"], named[f"sin[{i}]"]) for i in range(len(named)) if f"cos[{i}]" in named
     )
@@ -94,7 +94,7 @@ UNITS = {"torque": "N·m", "current": "A", "rated_torque": "%", "voltage": "V"}
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Records, an axis and a law, ready to be simulated at any parameters.
+    """Records, an axis and a law, ready for simulation with any parameters.
 
     Attributes
     ----------
@@ -102,14 +102,14 @@ class Problem:
     axis : ServoAxis
     law : Law
     vector : Vector
-        Of mechanics and law.
+        Vector of mechanics and law.
     courses : tuple of Course
     signals : tuple of str
-        What is compared: "drive", "position".
+        Signals that are compared: "drive", "position".
     weights : mapping of str to float
         Standard deviation of a misfit of each signal.
     robust : bool
-        Misfits beyond `ROBUST` standard deviations count linearly (soft L1).
+        Whether misfits beyond `ROBUST` standard deviations count linearly (soft L1).
     harmonic_period : float
     """
 
@@ -128,7 +128,7 @@ class Problem:
         experiments: Sequence[Experiment], axis: ServoAxis, law: Law, vector: Vector, *, inertia: float,
         robust: bool = False, harmonic_period: float = 2.0 * math.pi, max_step: float = MAX_STEP,
     ) -> Problem:  # fmt: skip
-        """Lay the records out; `inertia` sets the observer's stiffness where one is needed."""
+        """Prepare the records for simulation; `inertia` sets the observer's stiffness where one is needed."""
         courses = tuple(Course(law, drive_of(t, inertia, max_step)) for t in experiments)
         signals = tuple(s for s in SIGNALS if all(has(t, s) for t in experiments))
         return Problem(
@@ -150,7 +150,7 @@ class Problem:
         return {s: self.axis.unit("rad") if s == "position" else drive for s in self.signals}
 
     def weighted(self, u: Array) -> Problem:
-        """This problem with the weights that the misfits at u suggest (robust standard deviations)."""
+        """Return this problem with the weights estimated from the misfits at u (robust standard deviations)."""
         misfits = self.misfits(u)
         if misfits is None:
             raise InputError(
@@ -164,7 +164,7 @@ class Problem:
         return replace(self, weights=weights)
 
     def resolved(self, u: Array) -> Problem:
-        """This problem with steps so short that half of them would change its misfits by little of their weights."""
+        """Return this problem with steps so short that halving them hardly changes its misfits."""
         problem = self
         for _ in range(HALVINGS):
             finer = replace(problem, courses=tuple(
@@ -178,11 +178,11 @@ class Problem:
         return problem
 
     def mechanics(self, named: Mapping[str, float]) -> Mechanics:
-        """The axis at named values."""
+        """Return the mechanics at named values."""
         return mechanics_of(named, self.harmonic_period)
 
     def simulated(self, u: Array) -> list[Array] | None:
-        """Every record simulated (`Course.run`); None where the law refuses the parameters."""
+        """Simulate every record (`Course.run`); None if the law refuses the parameters."""
         p = feasible(self.law, self.vector.law_parameters(u))
         if p is None:
             return None
@@ -195,7 +195,7 @@ class Problem:
         ]
 
     def misfits(self, u: Array) -> list[Array] | None:
-        """Simulated minus measured signals of every record at the rows in use, shape (rows, signals)."""
+        """Return simulated minus measured signals of every record in the rows in use, shape (rows, signals)."""
         runs = self.simulated(u)
         if runs is None:
             return None
@@ -206,7 +206,7 @@ class Problem:
         return out
 
     def residuals(self, u: Array) -> Array:
-        """All misfits over their weights, signals of one time side by side, shape (n,)."""
+        """Return all misfits over their weights, signals of one time adjacent, shape (n,)."""
         misfits = self.misfits(u)
         if misfits is None:
             return np.full(sum(int(t.rows.sum()) for t in self.experiments) * len(self.signals), np.inf)
@@ -215,7 +215,7 @@ class Problem:
         return soft(r) if self.robust else r
 
     def model(self, u: Array) -> Model:
-        """The law at u, its static torque raised to the Coulomb torque where it would lie below."""
+        """Return the law at u, its static torque raised to the Coulomb torque if it would be below."""
         p = feasible(self.law, self.vector.law_parameters(u))
         assert p is not None
         return Model(self.law, **p._asdict())
@@ -225,22 +225,22 @@ PLACE = {"position": 0, "drive": 2}
 
 
 def has(experiment: Experiment, signal: str) -> bool:
-    """Whether a simulation of this record can be compared with that signal."""
+    """Return whether a simulation of this record can be compared to that signal."""
     return signal == "position" or (experiment.closed_loop and experiment.drive is not None)
 
 
 def measured(experiment: Experiment, signal: str) -> Array:
-    """The measured signal that a simulation is compared with, shape (n,)."""
+    """Return the measured signal to which a simulation is compared, shape (n,)."""
     return experiment.position if signal == "position" else experiment.signal()
 
 
 def soft(r: Array) -> Array:
-    """Residuals whose squares grow linearly beyond 1 (soft L1: Charbonnier et al. 1994)."""
+    """Return residuals whose squares grow linearly beyond 1 (soft L1: Charbonnier et al. 1994)."""
     return np.copysign(np.sqrt(2.0 * (np.sqrt(1.0 + r * r) - 1.0)), r)
 
 
 def drive_of(experiment: Experiment, inertia: float, max_step: float) -> Drive:
-    """What moves the simulated axis."""
+    """Return the input of the simulated axis."""
     if experiment.closed_loop:
         assert experiment.reference is not None
         return Drive(
@@ -258,7 +258,7 @@ def drive_of(experiment: Experiment, inertia: float, max_step: float) -> Drive:
 
 
 def smooth(experiment: Experiment) -> Array:
-    """The position behind a zero-phase low-pass at a tenth of the sample rate, at the record's times."""
+    """Return the position after a zero-phase low-pass at a tenth of the sample rate, at the record's times."""
     from stickslip.identification.fit.filters import low_pass
     from stickslip.identification.regression.inverse import uniform
 

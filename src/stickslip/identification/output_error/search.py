@@ -1,7 +1,7 @@
-"""The search of output error: from an axis's records and a law to the parameters whose simulation comes closest.
+"""The search of output error: the parameters of a law whose simulation is closest to an axis's records.
 
-Levels of friction and inertia come from the inverse dynamics, the rest from the law's example on the axis's scales;
-the best starts are descended from, with weights and steps of the integration that suit where the search stands.
+Levels of friction and inertia come from the inverse dynamics, the rest from the law's example on the axis's scales; the
+best starts are descended from, with weights and integration steps adapted to the present point.
 """
 
 from __future__ import annotations
@@ -33,34 +33,34 @@ from stickslip.simulation.recorded_input.simulation import Mechanics
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 ROUGH, ENOUGH = 0.1, 3e-3
-"""Relative decrease of the sum of squares at which a first and a later descent end."""
+"""Relative decrease of the sum of squares at which a first and a later descent stop."""
 DIFFERENCE = 1e-3
-"""Of coordinates, for their first Jacobians."""
+"""Step of the coordinates for the first Jacobians."""
 BEGIN = 0.34
-"""Part of the way travelled that the first descents look at."""
+"""Part of the travel used by the first descents."""
 SETTLED = 0.1
-"""Change of the weights, relative, below which they need no other descent."""
+"""Relative change of the weights below which no other descent follows."""
 DESCENTS = 3
-"""Of how many starts a rough descent is made."""
+"""Number of starts for rough descents."""
 LEVELS = {"fc", "sigma2"}
 """Level and slope of friction, which may be given for any law."""
 REACH = 7.0
-"""How far a logarithmic coordinate may go from its start: a factor of 1100."""
+"""Greatest distance of a logarithmic coordinate from its start: a factor of 1100."""
 
 
 @dataclass(frozen=True)
 class Extras:
-    """Terms beside inertia, offset and the law.
+    """Terms in addition to inertia, offset and the law.
 
     Attributes
     ----------
     harmonics, friction_harmonics : int
         Harmonics of a torque, and of friction's share, over the position.
     harmonic_period : float
-        rad (m) after which they repeat.
+        Period of the harmonics, rad (m).
     load : bool
-        Friction grows with the torque that the gearing carries; with the outer torque's own share (``load_external``)
-        only where that changes, that is for a pendulum, or where it is freed by name.
+        Whether friction grows with the torque that the gearing carries; with the outer torque's own share
+        (``load_external``) only if that torque changes, as for a pendulum, or if it is freed by name.
     """
 
     harmonics: int = 0
@@ -71,7 +71,7 @@ class Extras:
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What is asked of a fit.
+    """Options of a fit.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class FittedAxis:
-    """An axis with the parameters that were found.
+    """An axis with its fitted parameters.
 
     Attributes
     ----------
@@ -107,11 +107,11 @@ class FittedAxis:
 
     @property
     def mechanics(self) -> Mechanics:
-        """All but friction."""
+        """The mechanics: all parameters except friction."""
         return self.problem.mechanics(self.problem.vector.named(self.u))
 
     def on(self, experiments: Sequence[Experiment]) -> Problem:
-        """The same problem with other records (or rows)."""
+        """Return the same problem with other records (or rows)."""
         problem = self.problem
         if len(experiments) == len(problem.experiments) and all(
             map(operator.is_, experiments, problem.experiments)
@@ -126,26 +126,26 @@ class FittedAxis:
         )  # fmt: skip
 
     def simulated(self, experiments: Sequence[Experiment]) -> list[Array]:
-        """Any records simulated with the fitted axis (`stickslip.simulation.recorded_input.simulation.COLUMNS`)."""
+        """Simulate any records with the fitted axis (`stickslip.simulation.recorded_input.simulation.COLUMNS`)."""
         runs = self.on(experiments).simulated(self.u)
         assert runs is not None
         return runs
 
     def misfits(self, experiments: Sequence[Experiment]) -> list[Array]:
-        """Simulated minus measured signals on records (or rows), each of shape (rows, signals)."""
+        """Return simulated minus measured signals on records (or rows), each of shape (rows, signals)."""
         misfits = self.on(experiments).misfits(self.u)
         assert misfits is not None
         return misfits
 
     def held_out(self, experiments: Sequence[Experiment]) -> dict[str, float]:
-        """The errors (`errors_of`) on records (or rows) that were not fitted."""
+        """Return the errors (`errors_of`) on records (or rows) that were not fitted."""
         return errors_of(experiments, self.problem.signals, self.misfits(experiments))
 
 
 def errors_of(
     experiments: Sequence[Experiment], signals: Sequence[str], misfits: Sequence[Array]
 ) -> dict[str, float]:
-    """Norms of misfit over norms of signal, root mean squares and mean absolute misfits of each signal."""
+    """Return relative norms, root mean squares and mean absolute values of the misfit of each signal."""
     out: dict[str, float] = {}
     for place, name in enumerate(signals):
         wrong = np.concatenate([m[:, place] for m in misfits])
@@ -165,10 +165,10 @@ def fitted_axis(
     *,
     tolerance: float = ENOUGH,
 ) -> FittedAxis:
-    """Find the parameters of an axis, without a judgement on them.
+    """Estimate the parameters of an axis, without verdicts.
 
     Parameters and errors as in `stickslip.identification.output_error.output.output_error`; ``tolerance`` is the
-    relative decrease of the sum of squares at which the last descent ends.
+    relative decrease of the sum of squares at which the last descent stops.
     """
     if first is None:
         require_start(experiments, axis, [law], asked)
@@ -185,7 +185,7 @@ def fitted_axis(
     for descents in range(3):
         weights = problem.weights
         problem = problem.weighted(u)
-        # The first descents saw the beginnings of the records only.
+        # The first descents used the starts of the records only.
         if descents and all(abs(problem.weights[s] / weights[s] - 1.0) < SETTLED for s in weights):
             break
         problem = problem.resolved(u)
@@ -194,7 +194,7 @@ def fitted_axis(
 
 
 def rows_until(experiment: Experiment, part: float) -> int:
-    """Rows in which a part of the whole way is travelled."""
+    """Return the number of rows in which a part of the whole distance is travelled."""
     way: Array = np.cumsum(np.abs(np.diff(experiment.position)))
     return int(np.sum(way < part * float(way[-1]))) + 2
 
@@ -202,7 +202,7 @@ def rows_until(experiment: Experiment, part: float) -> int:
 def descended(
     problem: Problem, u: Array, tolerance: float = ENOUGH, difference: float = DIFFERENCE
 ) -> tuple[Array, float]:
-    """Coordinates and sum of squares to which the misfit falls from u."""
+    """Descend from u; return coordinates and sum of squares."""
     vector = problem.vector
     squares = Squares(problem.residuals, vector.lower, vector.upper, difference)
     return descend_by_secants(squares, u, tolerance=tolerance)
@@ -212,7 +212,7 @@ def ranked_starts(
     experiments: Sequence[Experiment], axis: ServoAxis, law: Law, candidates: Sequence[tuple[Vector, float]],
     asked: Asked,
 ) -> list[tuple[float, Problem, Array]]:  # fmt: skip
-    """Sum of squares, problem and coordinates of every start that can be simulated, the best first."""
+    """Return sum of squares, problem and coordinates of every start that can be simulated, the best first."""
     out: list[tuple[float, Problem, Array]] = []
     weights: Mapping[str, float] | None = None
     for vector, inertia in candidates:
@@ -239,13 +239,13 @@ def ranked_starts(
     return sorted(out, key=lambda found: found[0])
 
 
-# ---- where the search starts ----------------------------------------------------------------------------------
+# ---- starts of the search --------------------------------------------------------------------------------------
 
 
 class NearVector(Vector):
     """A vector whose logarithmic coordinates stay within `REACH` of their start.
 
-    Simulations take longer the farther a parameter runs off that the data do not determine.
+    Simulations become slower the farther an undetermined parameter drifts.
     """
 
     @property
@@ -270,7 +270,7 @@ class NearVector(Vector):
 def starting_models(
     experiments: Sequence[Experiment], law: Law, first: InverseDynamics | None, given: Mapping[str, Any]
 ) -> list[Model]:
-    """Models to start from: scaled examples, or what the user gave."""
+    """Return starting models: scaled examples, or the values given by the user."""
     known = {f.name: given[f.name] for f in law.fields if f.name in given}
     needed = [f.name for f in law.fields if f.par.default is None]
     if all(name in known for name in needed):
@@ -289,7 +289,7 @@ def laid_out(
     experiments: Sequence[Experiment], axis: ServoAxis, law: Law, first: InverseDynamics | None, model: Model,
     asked: Asked,
 ) -> tuple[Vector, float]:  # fmt: skip
-    """The vector of everything that is fitted, and the inertia it starts from."""
+    """Return the vector of all fitted parameters, and its starting inertia."""
     given, extras = asked.values, asked.extras
     values: dict[str, float] = {}
     if first is not None:
@@ -325,7 +325,7 @@ def laid_out(
 def require_start(
     experiments: Sequence[Experiment], axis: ServoAxis, laws: Sequence[Law], asked: Asked
 ) -> None:
-    """Refuse a search that has neither inverse dynamics nor starting values of any of the laws: it says why.
+    """Refuse a search without inverse dynamics and without starting values of any of the laws, with the reason.
 
     Raises
     ------
@@ -333,7 +333,7 @@ def require_start(
     """
     given, extras = asked.values, asked.extras
     whole = any(all(f.name in given for f in x.fields if f.par.default is None) for x in laws)
-    needed = [] if whole or given.get("fc", 0.0) > 0.0 else ["fc"]  # from which the others follow
+    needed = [] if whole or given.get("fc", 0.0) > 0.0 else ["fc"]  # The others follow from it.
     if "inertia" not in given:
         needed.append("inertia")
     if not needed:
@@ -362,7 +362,7 @@ def require_known(names: Iterable[str], known: set[str]) -> None:
 
 
 def first_inertia(first: InverseDynamics) -> float:
-    """That of the inverse dynamics; where it does not tell it from 0, what friction accelerates as in the record."""
+    """Return the inertia of the inverse dynamics; if it is not distinct from 0, friction over usual acceleration."""
     place = first.names.index("inertia")
     if first.values[place] > 2.0 * first.robust_std[place]:
         return float(first.values[place])
@@ -371,7 +371,7 @@ def first_inertia(first: InverseDynamics) -> float:
 
 
 def scaled_parameter(p: Parameter, torque: float) -> Parameter:
-    """A parameter with a typical size: signed torques that of friction, angles a radian."""
+    """Return a parameter with a typical size: friction for signed torques, a radian for angles."""
     if p.par.unit in ("N·m", "N"):
         return replace(p, scale=max(torque, abs(p.value)) or 1.0)
     if p.par.unit.startswith("1/"):

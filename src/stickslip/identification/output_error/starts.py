@@ -1,7 +1,7 @@
-"""Where a search for a law's parameters starts, and what its simulation follows.
+"""Starts of a search for a law's parameters, and the motion that its simulation follows.
 
-Examples of the law are carried over to the scales of the axis, as they are and with their steady torque fitted to the
-levels of friction that plain least squares leave.
+Examples of the law are scaled to the axis, both as they are and with their steady torque fitted to the levels of
+friction from plain least squares.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ from stickslip.models.model import Model
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SLOWER = (0.02, 0.1, 0.5)
-"""Parts of the usual speed at which a Stribeck effect is looked for."""
+"""Parts of the usual speed at which a Stribeck effect is assumed."""
 WORSE = 1.1
-"""Times the misfit of the best start to the measured levels, up to which one is followed."""
+"""Greatest misfit of a start to the measured levels, relative to the best, for it to be followed."""
 RESTING, SLOWEST = 0.02, 1e-3
-"""s of rest after which a torque counts as withstood; and the part of the usual speed that counts as creeping."""
+"""Time at rest after which a torque counts as withstood, s; greatest creep, part of the usual speed."""
 LEVELS = 24
-"""Groups of speeds, from slow to fast, in which friction is averaged to start from."""
+"""Groups of speeds, from slow to fast, over which friction is averaged for the start."""
 
 
 class Watched(NamedTuple):
-    """What the observer follows."""
+    """Input of the observer."""
 
     motions: list[Motion]
     band: float
-    """Hz up to which its corrections count"""
+    """Bandwidth of its corrections, Hz."""
 
 
 def watched(experiments: Sequence[Experiment], axis: ServoAxis, asked: Asked) -> Watched:
-    """The experiments as the observer sees them; refuses what it cannot follow."""
+    """Prepare the experiments for the observer; refuse those that it cannot follow."""
     for t in experiments:
         if t.drive is None:
             raise InputError(f"{t.name}: the drive's signal is missing; this method needs it")
@@ -57,7 +57,7 @@ def watched(experiments: Sequence[Experiment], axis: ServoAxis, asked: Asked) ->
 
 
 def motion_of(experiment: Experiment) -> Motion:
-    """The experiment on a regular grid, its drive's signal as it acts."""
+    """Return the experiment on a regular grid, with its drive's signal including the supply."""
     t, q, u, _ = uniform(experiment)
     supply = 1.0 if experiment.supply is None else np.interp(t, experiment.time, experiment.supply)
     return Motion(t, q, supply * u, encoder_step(q))
@@ -70,10 +70,10 @@ def starting_points(
     first: InverseDynamics,
     given: Mapping[str, Any],
 ) -> list[Model]:
-    """Examples on this axis's scales, as they are and with their steady torque fitted to the measured levels.
+    """Return examples on this axis's scales, as they are and with their steady torque fitted to the measured levels.
 
-    The levels of a motion that sticks and slips mislead: there the torque that was withstood at rest takes the place
-    of the slowest. The simulation decides.
+    In stick-slip motion the levels are misleading: the torque withstood at rest then replaces the slowest ones. The
+    simulation decides between the starts.
     """
     held = [f.name for f in law.fields if f.name in given]
     slower = [replace(first, velocity=part * first.velocity) for part in SLOWER]
@@ -91,7 +91,7 @@ def starting_points(
 
 
 def held_torque(experiments: Sequence[Experiment], axis: ServoAxis, first: InverseDynamics) -> float:
-    """Torque that the contact withstood at rest, N·m: where the position stays within two counts for a while."""
+    """Return the torque that the contact withstood at rest, N·m: while the position stays within two counts."""
     level = 0.0
     for experiment in experiments:
         motion = motion_of(experiment)
@@ -106,7 +106,7 @@ def held_torque(experiments: Sequence[Experiment], axis: ServoAxis, first: Inver
 
 
 def levels_of(first: InverseDynamics) -> tuple[Array, Array]:
-    """Speeds, from slow to fast, and the friction that the inverse dynamics leaves there, N·m."""
+    """Return speeds, from slow to fast, and friction there according to the inverse dynamics, N·m."""
     v = first.velocity
     friction = first.residual + np.sign(v) * first.coulomb + first.viscous * v
     groups = [g for g in np.array_split(np.argsort(np.abs(v)), LEVELS) if g.size]
@@ -115,7 +115,7 @@ def levels_of(first: InverseDynamics) -> tuple[Array, Array]:
 
 
 def misfit_of(model: Model, speed: Array, torque: Array) -> float:
-    """Sum of absolute differences of the steady torque from that at the levels, N·m; 1 for a law without one."""
+    """Return the sum of absolute differences of the steady torque from the levels, N·m; 1 for a law without one."""
     steady = model.law.steady
     if steady is None:
         return 1.0

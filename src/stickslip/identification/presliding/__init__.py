@@ -1,1 +1,1 @@
-"""What a contact does before and as it breaks away: stiffness, hysteresis, break-away, attraction."""
+"""A contact before and during break-away: stiffness, hysteresis, break-away, attraction."""

@@ -1,8 +1,8 @@
 """The attraction parameter C of GMS: how fast its elements follow the sliding curve.
 
-From a velocity that varies within the Stribeck region without reversing (thesis 3.1.3.2.4.2, eq. 3.22), where friction
-lags behind s(v). If no such lag can be measured, from the law alone: the first C whose response to a sudden velocity of
-5 rad/s does not overshoot (4.3.1.1.5).
+It is fitted to a velocity that varies within the Stribeck region without reversing (thesis 3.1.3.2.4.2, eq. 3.22), with
+friction delayed relative to s(v). If no such lag can be measured, it follows from the law alone: the first C whose
+response to a sudden velocity of 5 rad/s does not overshoot (4.3.1.1.5).
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ FASTER = (
 SKIPPED = 0.2
 """Part of the record left out at its start: the transient from rest."""
 SUDDEN, RISE, DURATION = 5.0, 1e-3, 0.2
-"""A velocity, rad/s, the time in which it is reached, one sample of the thesis's controller, and the response, s."""
+"""Velocity step, rad/s; its rise time, one sample of the thesis's controller, s; and duration of the response, s."""
 WITHIN, AFTER = 100, 1000
-"""Steps of the rise and of the rest of a response: ten times as many change an overshoot by less than 1e-5 of the
-torque, while a single step of the rise makes an overshoot of 1.6 % one of 26 % (thesis Table 10)."""
+"""Steps of the rise and of the rest of a response, enough for the overshoot to converge; a single step of the rise
+would greatly exaggerate it (thesis Table 10)."""
 OVERSHOOT = 1e-3
-"""Part of the steady torque beyond which a response overshoots: less than a line's width in figures 4.14 and 4.38."""
+"""Part of the steady torque above which a response overshoots: less than a line's width in figures 4.14 and 4.38."""
 LEAST, MOST, PER_DECADE = 1.0, 1e4, 4
-"""N·m/s, the range in which C is searched, and values of C per decade at which the overshoot is computed."""
+"""Range in which C is searched, N·m/s; values of C per decade at which the overshoot is computed."""
 
 
 def identify_attraction(loop: Loop, template: Model, *, noise: Noise | float | None = None) -> Identification:
-    """Fit C to the lag of friction behind the sliding curve; everything else of the law stays.
+    """Fit C to the lag of friction behind the sliding curve; the law's other parameters are held.
 
     Parameters
     ----------
@@ -106,18 +106,18 @@ def identify_attraction(loop: Loop, template: Model, *, noise: Noise | float | N
 
 @dataclass(frozen=True, eq=False)
 class OvershootRule:
-    """What the rule of thesis 4.3.1.1.5 gives for a law: `apply_overshoot_rule` fills it.
+    """Result of the rule of thesis 4.3.1.1.5 for a law, from `apply_overshoot_rule`.
 
     Attributes
     ----------
     model : Model
         The GMS law.
     velocity, rise_time : float
-        The sudden velocity, rad/s, and the time in which it is reached, s.
+        The velocity step, rad/s, and its rise time, s.
     c : float or None
-        The first C without overshoot, N·m/s; None if there is no such C, or if it is any.
+        The first C without overshoot, N·m/s; None if no C qualifies or every C does.
     values, overshoot : array, shape (n,)
-        C, N·m/s, ascending, and the overshoot there, as part of the steady torque.
+        C, N·m/s, ascending, and its overshoot as a part of the steady torque.
     """
 
     model: Model
@@ -129,7 +129,7 @@ class OvershootRule:
 
     @property
     def sentence(self) -> str:
-        """The result in words."""
+        """The result as a sentence."""
         low, high = (f"{x:.5g}" for x in self.values[[0, -1]])
         none = f"below {100.0 * OVERSHOOT:g} %"
         first, last = (f"{100.0 * x:.2g} %" if x > OVERSHOOT else none for x in self.overshoot[[0, -1]])
@@ -145,11 +145,11 @@ class OvershootRule:
         return response_to_velocity(with_attraction(self.model, c), self.velocity, self.rise_time, DURATION)
 
     def lines(self) -> list[str]:
-        """What people read."""
+        """Return the result as lines of text."""
         return [f"response to a sudden {self.velocity:g} rad/s: {self.sentence}"]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {
             "velocity": self.velocity, "rise_time": self.rise_time, "c": self.c, "values": self.values.tolist(),
             "overshoot": self.overshoot.tolist(), "sentence": self.sentence,
@@ -166,17 +166,17 @@ def apply_overshoot_rule(
 ) -> OvershootRule:
     """Find the first C whose response to a sudden velocity does not overshoot its steady torque (thesis 4.3.1.1.5).
 
-    The first is the limit between values of C that overshoot and values that do not, whether the overshoot falls with C
-    (friction that falls to this velocity) or grows.
+    It is the limit between values of C with and without overshoot, whether the overshoot decreases with C (friction
+    that falls up to this velocity) or increases.
 
     Parameters
     ----------
     model : Model
-        A GMS law; its own C does not matter.
+        A GMS law; its own C is ignored.
     velocity, rise_time : float
-        rad/s, and the time in which it is reached, s. If it is reached at once, no C overshoots.
+        rad/s, and its rise time, s. Without a rise time, no C overshoots.
     lower, upper : float
-        Between which C is searched, N·m/s.
+        Bounds of C in the search, N·m/s.
 
     Raises
     ------
@@ -216,7 +216,7 @@ def with_attraction(model: Model, c: float) -> Model:
 def response_to_velocity(
     model: Model, velocity: float, rise_time: float, duration: float
 ) -> tuple[Array, Array]:
-    """Return time, s, and torque, N·m, of a contact at rest that is moved at a velocity, reached at a steady rate."""
+    """Return time, s, and torque, N·m, of a contact at rest moved at a velocity, which rises at a constant rate."""
     rise = np.linspace(0.0, rise_time, WITHIN + 1)
     time = np.concatenate([rise, np.linspace(rise_time, duration, AFTER + 1)[1:]])
     ramp = np.minimum(time / rise_time, 1.0) * velocity

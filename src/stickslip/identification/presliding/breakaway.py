@@ -1,8 +1,8 @@
 """Break-away torque from slow torque ramps: thesis 4.3.1.1.1 and 4.3.2.1.1.
 
-The torque at which the velocity first exceeds a threshold, by angle and direction; its mean and spread; and whether it
-depends on the ramp rate (thesis 2.1.1: break-away falls as the torque rises faster). Where the axis sticks and slips on
-while the torque rises, only the first break of a ramp counts: what breaks later had been moving just before.
+It is the torque at which the velocity first exceeds a threshold, by angle and direction; its mean and spread; and its
+dependence on the ramp rate (thesis 2.1.1: break-away decreases as the torque rises faster). If the axis sticks and
+slips while the torque rises, only the first break of a ramp counts, since later ones follow recent motion.
 """
 
 from __future__ import annotations
@@ -22,25 +22,28 @@ from stickslip.identification.fit.student import student_quantile
 from stickslip.identification.steady_friction.levels import slope_of
 
 WINDOW = 0.02
-"""s, over which a velocity is taken where the record has none."""
+"""Window of a velocity if the record has none, s."""
 RAMP = 0.7
-"""Part of its torque by which the torque must have risen at rest before a break-away that a ramp surely brought about.
-Where an axis that follows a reference sticks and slips, it rises by up to a half; after a ramp from a torque that is
-held, against gravity say, by as little: such a record is not told from one of a motion, so that neither is refused."""
+"""Least rise of the torque at rest, part of the break-away torque, that proves a ramp: stick-slip of an axis that
+follows a reference shows less. So does a ramp from a held torque (against gravity), which cannot be distinguished from
+a motion; neither is therefore refused."""
 RETURNED = 0.7
-"""Part of its torque below which the torque must have come after a break-away for the next one in its direction to be
-the first of a ramp of its own."""
+"""Part of the break-away torque to which the torque must return for the next break-away in its direction to be the
+first of another ramp."""
 COUNTS = 3.0
-"""Counts of the encoder, within `WINDOW`, that are motion rather than creep or noise."""
+"""Least motion within `WINDOW`, counts of the encoder, as opposed to creep or noise."""
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 @dataclass(frozen=True, slots=True)
 class Break:
-    """One break-away: time (s), angle (rad), direction (+1, -1), torque (N·m, in its direction), ramp rate (N·m/s), by
-    which part of it the torque had risen in its direction since the axis came to rest, by how much it may be wrong as
-    rows and threshold go (N·m), and whether it is the first of its ramp."""
+    """One break-away.
+
+    Time (s), angle (rad), direction (+1, -1), torque (N·m, in its direction) and ramp rate (N·m/s). `risen`: part of
+    the torque by which it rose in its direction since the axis came to rest; `doubt`: error due to rows and threshold
+    (N·m); `first`: whether it is the first of its ramp.
+    """
 
     time: float
     angle: float
@@ -53,7 +56,7 @@ class Break:
 
     @property
     def ramped(self) -> bool:
-        """Whether a torque ramp from rest brought it about."""
+        """Whether a torque ramp from rest caused it."""
         return self.risen >= RAMP
 
 
@@ -65,7 +68,7 @@ def find_breaks(
     Parameters
     ----------
     record : Record
-        Channels ``position``, the torque's, and ``velocity`` where there is one.
+        Channels ``position``, the torque's, and ``velocity`` if there is one.
     torque : str
         Motor side or sensor side.
     threshold : float
@@ -77,7 +80,7 @@ def find_breaks(
     v = record["velocity"] if "velocity" in record.channels else slope_of(time, position, WINDOW)
     found: list[Break] = []
     quiet_since, ready = math.nan, False
-    first = 0  # row at which the rest began
+    first = 0  # first row of the rest
     for k in range(time.size):
         i = k
         if abs(v[i]) < 0.2 * threshold:
@@ -91,7 +94,7 @@ def find_breaks(
                 rows = np.flatnonzero((time <= time[i]) & (time >= time[i] - rest))
                 width = float(time[rows[-1]] - time[rows[0]])
                 rate = float(load[rows[-1]] - load[rows[0]]) / width if width > 0.0 else math.nan
-                # Between two rows, and while the motion was not seen yet, the torque went on.
+                # The torque changed between two rows, and before the motion was detected.
                 doubt = abs(float(load[k] - load[i])) + abs(rate) * float(time[i] - time[max(i - 1, 0)])
                 found.append(broken(time, position, load, first, i, int(np.sign(v[k])), abs(rate), doubt))
             quiet_since, ready = math.nan, False
@@ -103,7 +106,7 @@ def find_breaks(
 def broken(
     time: Array, position: Array, load: Array, first: int, at: int, direction: int, rate: float, doubt: float
 ) -> Break:
-    """The break-away at a row, after a rest that began at `first`."""
+    """Return the break-away at a row, after a rest from row `first` on."""
     since = direction * load[min(first, at) : at + 1]
     size = float(since[-1])
     risen = float(since[-1] - np.min(since)) / size if size > 0.0 else 0.0
@@ -111,7 +114,7 @@ def broken(
 
 
 def firsts_marked(breaks: Sequence[Break], time: Array, load: Array) -> tuple[Break, ...]:
-    """The same, those marked before which the torque had not come back since an earlier one in their direction."""
+    """Mark break-aways before which the torque had not returned since an earlier one in their direction."""
     out: list[Break] = []
     for b in breaks:
         before = next((a for a in reversed(out) if a.first), None)
@@ -124,7 +127,7 @@ def firsts_marked(breaks: Sequence[Break], time: Array, load: Array) -> tuple[Br
 
 
 def departure(time: Array, position: Array, seen: int, threshold: float) -> int:
-    """The last sample at rest before a motion that the slope over a window has seen at a sample."""
+    """Return the last sample at rest before a motion that the slope over a window detects at a sample."""
     near = np.flatnonzero(np.abs(time - time[seen]) <= WINDOW).tolist()
     first, last = int(near[0]), int(near[-1]) + 1
     for k in range(first, last):
@@ -140,13 +143,13 @@ def identify_breakaway(
     threshold: float = 0.01,
     rest: float = 0.05,
 ) -> Identification:
-    """Mean break-away torque of each direction, with its interval and spread.
+    """Identify the mean break-away torque of each direction, with its interval and spread.
 
     Returns
     -------
     Identification
-        Estimates fs_positive, fs_negative (those directions that occur) and, with three ramp rates or more,
-        rate_effect: the change per tenfold ramp rate. ``details["breaks"]`` lists every break-away.
+        Estimates fs_positive, fs_negative (directions that occur) and, with three ramp rates or more, rate_effect: the
+        change per tenfold ramp rate. ``details["breaks"]`` lists every break-away.
 
     Raises
     ------
@@ -155,8 +158,8 @@ def identify_breakaway(
 
     Notes
     -----
-    The first break-away of every ramp counts. Where fewer than half of these follow a torque ramp from rest
-    (`Break.ramped`), nothing counts as identified and a note says so: most likely that is the record of a motion.
+    The first break-away of every ramp counts. If fewer than half of these follow a torque ramp from rest
+    (`Break.ramped`), nothing counts as identified, and a note reports it: the record is most likely that of a motion.
     """
     several = [records] if isinstance(records, Record) else list(records)
     every = [b for r in several for b in find_breaks(r, torque=torque, threshold=threshold, rest=rest)]
@@ -204,7 +207,7 @@ def identify_breakaway(
 
 
 def ramp_notes(found: int, ramps: int) -> list[str]:
-    """What is to be said where only so many of the break-aways that were found followed a torque ramp."""
+    """Report that only some of the break-aways followed a torque ramp."""
     if ramps == found:
         return []
     if 2 * ramps >= found:
@@ -219,7 +222,7 @@ def ramp_notes(found: int, ramps: int) -> list[str]:
 
 
 def count_notes(records: Sequence[Record], threshold: float) -> list[str]:
-    """That a few counts of an encoder pass the threshold."""
+    """Report that a few encoder counts exceed the threshold."""
     steps = [encoder_step(r["position"]) for r in records if "velocity" not in r.channels]
     enough = COUNTS * max(steps, default=0.0) / WINDOW
     if enough < 1.25 * threshold:
@@ -231,7 +234,7 @@ def count_notes(records: Sequence[Record], threshold: float) -> list[str]:
 
 
 def mean_estimate(name: str, values: Array, systematic: float = 0.0) -> Estimate:
-    """A mean with its Student interval, and half an interval (N·m) that repeats do not show; none below 0."""
+    """Return a mean with its Student interval and a half-width (N·m) that repeats do not show; not below 0."""
     mean = float(np.mean(values))
     if values.size < 2:
         return Estimate(
@@ -251,7 +254,7 @@ def mean_estimate(name: str, values: Array, systematic: float = 0.0) -> Estimate
 
 
 def rate_effect(breaks: Sequence[Break]) -> Estimate | None:
-    """Change of the break-away torque per tenfold ramp rate, N·m; None with fewer than three rates."""
+    """Return the change of the break-away torque per tenfold ramp rate, N·m; None with fewer than three rates."""
     usable = [b for b in breaks if math.isfinite(b.rate) and b.rate > 0.0]
     rates = np.log10(np.array([b.rate for b in usable]))
     if len(usable) < 4 or float(np.ptp(rates)) < 0.3:
@@ -272,13 +275,13 @@ def rate_effect(breaks: Sequence[Break]) -> Estimate | None:
 
 
 def turned(angles: Sequence[float]) -> Array:
-    """Angles in degrees; within a revolution where they lie beyond one."""
+    """Return angles in degrees; within one revolution if they exceed one."""
     degrees = np.degrees(np.array(angles))
     return np.mod(degrees, 360.0) if np.any(np.abs(degrees) > 400.0) else degrees
 
 
 def angle_picture(breaks: Sequence[Break], estimates: Sequence[Estimate]) -> Picture:
-    """Break-away torque over the angle (thesis figures 4.5, 4.27, 4.28)."""
+    """Draw the break-away torque over the angle (thesis figures 4.5, 4.27, 4.28)."""
     traces: list[Trace] = []
     for direction, kind, word in ((1, "points", "positive"), (-1, "open points", "negative")):
         chosen = [b for b in breaks if b.direction == direction]

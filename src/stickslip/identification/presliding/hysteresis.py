@@ -1,7 +1,7 @@
-"""A measured torque along a measured motion, fitted by any law; the choice among laws by errors on blocks left out.
+"""Fit of any law to a measured torque along a measured motion; choice among laws by errors on blocks left out.
 
-The offset that many records carry (gravity, a bias of the sensor) is fitted along. Errors are relative: root mean
-square of the error over that of the torque.
+The offset of many records (gravity, a sensor's bias) is fitted as well. Errors are relative: root mean square of the
+error over that of the torque.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ DAMPING = "N·m·s/rad"
 OFFSET = Par("N·m", "T_0", "torque that acts besides friction")
 
 STARTS = 3
-"""Of the search."""
+"""Starts of the search."""
 ENDS, COMPARED = 1e-8, 1e-7
-"""Relative decrease of the sum of squares at which a descent ends: of the result, and of laws that are compared."""
+"""Relative decrease of the sum of squares at which a descent stops: for the result, and for the comparison of laws."""
 BLOCKS = 4
-"""Of the fitted rows, left out in turn where laws are compared."""
+"""Blocks of the fitted rows, left out in turn in the comparison of laws."""
 ELASTIC = 0.95
 """Correlation of torque and displacement above which a loop is nearly elastic."""
 
@@ -50,7 +50,7 @@ class Loop:
     time, position, torque : array, shape (n,)
         s, rad, N·m; the torque positive against positive velocity.
     unit : (str, str)
-        Of position and torque.
+        Units of position and torque.
     velocity : array, shape (n,), optional
         rad/s; without it the motion is uniform from sample to sample.
     """
@@ -63,12 +63,12 @@ class Loop:
 
     @classmethod
     def of(cls, record: Record, torque: str = "friction_torque", velocity: str = "") -> Loop:
-        """The loop of a record's channels ``position`` and `torque`.
+        """Build the loop from a record's channels ``position`` and `torque`.
 
         Raises
         ------
         InputError
-            If one of them never changes.
+            If one of them is constant.
         """
         for channel in ("position", torque):
             values = record[channel]
@@ -89,10 +89,10 @@ class Loop:
         return float(np.sum((middle - float(np.mean(self.torque))) * np.diff(self.position)))
 
     def without_inertia(self, inertia: float) -> Loop:
-        """This loop with the torque of friction alone: without that which accelerates an inertia (kg·m²).
+        """Return this loop with friction's torque only, without that which accelerates an inertia (kg·m²).
 
-        The acceleration is that of cubic polynomials over a twentieth of the time between two turns of the motion
-        to either side (Savitzky and Golay 1964).
+        The acceleration is that of cubic polynomials over a twentieth of the time between two turning points to either
+        side (Savitzky and Golay 1964).
         """
         signal: Any = importlib.import_module("scipy.signal")
         dt = float(np.median(np.diff(self.time)))
@@ -105,8 +105,8 @@ class Loop:
         return replace(self, torque=self.torque - inertia * np.asarray(acceleration))
 
     def righted(self) -> tuple[Loop, tuple[str, ...]]:
-        """This loop, or with the torque's sign changed where it would feed energy in; and a note that says so."""
-        # A loop that is nearly elastic does no work to speak of: there the sign of its stiffness decides.
+        """Return this loop, its torque's sign inverted if it would supply energy, and a note if so."""
+        # A nearly elastic loop does almost no work: the sign of its stiffness decides instead.
         if self.work >= 0.0 or float(np.corrcoef(self.position, self.torque)[0, 1]) > ELASTIC:
             return self, ()
         note = "The torque does work with the motion, which friction cannot: its sign was changed."
@@ -118,13 +118,13 @@ def fit_loop(
     offset: bool = True, starts: int | Array | Fit = 6, profiles: bool = True, reach: float = 1.5, lags: int = 0,
     tolerance: float = 1e-12, damping: float = 0.0,
 ) -> tuple[Fit, Along]:  # fmt: skip
-    """Fit a law's torque along the motion on some rows; what is returned is simulated over all of them.
+    """Fit a law's torque along the motion on some rows; the returned simulation covers all rows.
 
-    The search starts at a fit's values, at coordinates, or at so many places. With `damping` (N·m·s/rad) a torque in
-    step with the velocity is fitted along, up to that to either side.
+    The search starts at a fit's values, at coordinates, or at that number of places. With `damping` (N·m·s/rad) a
+    torque proportional to the velocity is fitted as well, within plus or minus that coefficient.
     """
     along = along_until(template.law, loop, loop.time.size)
-    # What comes after the last row changes nothing there.
+    # Rows after the last one have no effect on it.
     seen = along_until(template.law, loop, int(np.max(rows, initial=0)) + 2)
     level = float(np.sqrt(np.mean(loop.torque[rows] ** 2)))
     extra: tuple[Parameter, ...] = (Parameter("offset", OFFSET, 0.0, scale=level),) if offset else ()
@@ -158,13 +158,13 @@ def fit_loop(
 
 
 def along_until(law: Law, loop: Loop, end: int) -> Along:
-    """A law that is moved along the first `end` samples of a loop."""
+    """Return a law that is moved along the first `end` samples of a loop."""
     velocity = None if loop.velocity is None else loop.velocity[:end]
     return Along(law, loop.time[:end], loop.position[:end], velocity)
 
 
 def curve_of(along: Along, vector: Vector, u: Array) -> Array:
-    """The law's torque, the offset, and what is in step with the velocity, at every sample."""
+    """Return the sum of the law's torque, the offset and the damping torque at every sample."""
     named = vector.named(u)
     assert vector.base is not None
     # It has as many elements as the law with these parameters.
@@ -174,7 +174,7 @@ def curve_of(along: Along, vector: Vector, u: Array) -> Array:
 
 
 def idle_parameters(along: Along, vector: Vector, rows: Rows) -> list[str]:
-    """Free parameters that do not act on these rows at all."""
+    """Return the free parameters that have no effect on these rows."""
     here = curve_of(along, vector, vector.start)[rows]
     idle: list[str] = []
     for p in vector.free:
@@ -194,15 +194,15 @@ def identify_hysteresis(
     *,
     fitted: Sequence[int] | Rows | None = None,
 ) -> Identification:
-    """Fit any law, and a constant torque beside it, to a torque along a motion.
+    """Fit any law, and a constant torque, to a torque along a motion.
 
     Parameters
     ----------
     loop : Loop
     template : Model
-        The law with its choices; its values are where the search starts.
+        The law with its choices; its values are the start of the search.
     fitted : sequence of int, optional
-        Rows to fit; all where not given. The others are the test: ``misfit["held_out_relative"]``.
+        Rows to fit; all if None. The others are the test: ``misfit["held_out_relative"]``.
 
     Returns
     -------
@@ -237,7 +237,7 @@ def identify_hysteresis(
 
 
 def turning_points(position: Array, part: float = 0.2) -> list[int]:
-    """Samples at which the motion turns, by at least `part` of its whole range."""
+    """Return the samples at which the motion turns, by at least `part` of its whole range."""
     least = part * float(np.ptp(position))
     turns: list[int] = []
     far, direction = 0, 0.0
@@ -255,21 +255,21 @@ def turning_points(position: Array, part: float = 0.2) -> list[int]:
 
 
 def after_transient(loop: Loop, rows: Rows) -> Rows:
-    """The rows after the second turning point, where there are cycles enough: the first one is a transient.
+    """Return the rows after the second turning point, if there are enough cycles: before it is a transient.
 
-    It depends on the state in which the contact happened to be (thesis 4.3.1.1.3).
+    The transient depends on the initial state of the contact (thesis 4.3.1.1.3).
     """
     turns = turning_points(loop.position)
     return rows[rows >= turns[1]] if len(turns) >= 6 else rows
 
 
 def relative_error(loop: Loop, curve: Array, rows: Rows) -> float:
-    """Root mean square of the error over that of the torque."""
+    """Return the root mean square of the error over that of the torque."""
     return float(np.linalg.norm((curve - loop.torque)[rows]) / np.linalg.norm(loop.torque[rows]))
 
 
 def loop_misfit(loop: Loop, curve: Array, rows: Rows, rest: Rows, found: Fit) -> dict[str, float]:
-    """Errors on the rows fitted, and on those held out."""
+    """Return the errors on the fitted rows and on those held out."""
     out = {"rms_Nm": found.rms, "relative": relative_error(loop, curve, rows)}
     if rest.size:
         out["held_out_relative"] = relative_error(loop, curve, rest)
@@ -277,7 +277,7 @@ def loop_misfit(loop: Loop, curve: Array, rows: Rows, rest: Rows, found: Fit) ->
 
 
 def correlation_lags(residuals: Array) -> int:
-    """Samples over which residuals are correlated: four times those until it has fallen to 1/e."""
+    """Return the samples over which residuals are correlated: four times those until it falls to 1/e."""
     r = residuals - np.mean(residuals)
     total = float(r @ r)
     lag = 1
@@ -295,7 +295,7 @@ def choose_hysteresis(
     -------
     name : str
     result : Identification
-        Of the chosen law; ``details["comparison"]`` has all.
+        Result of the chosen law; ``details["comparison"]`` has all.
     table : dict
         Per law: parameters, relative (error on the fitted rows), cross_validated (on blocks left out).
     """
@@ -322,10 +322,10 @@ def choose_hysteresis(
 
 
 def templates_for(loop: Loop, rows: Rows) -> dict[str, Model]:
-    """Laws that describe a rate-independent loop, with starts read off the record.
+    """Return laws of a rate-independent loop, with starting values estimated from the record.
 
-    Dahl (thesis eq. 2.7), Dahl with another level and shape for each direction, and Maxwell-slip with 4 elements
-    (eq. 2.15).
+    They are Dahl (thesis eq. 2.7), Dahl with separate level and shape for each direction, and Maxwell-slip with 4
+    elements (eq. 2.15).
     """
     straight, _ = loop.righted()
     level = float(np.quantile(np.abs(straight.torque[rows]), 0.95))

@@ -1,4 +1,4 @@
-"""The sliding curve that is known before the pre-sliding parameters are identified, carried over to another law."""
+"""Transfer of the known sliding curve to another law, whose pre-sliding parameters are then identified."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from stickslip.models.friction_levels import end_of_slope, levels_of, static_lev
 from stickslip.models.model import Model
 
 SLIDING = ("curve", "viscous", "symmetry", "position_dependence")
-"""Choices of a law that belong to sliding, and that a record of position and torque can follow."""
+"""Choices of a law that belong to sliding, and that a record of position and torque can determine."""
 FROM, TO, POINTS = 1e-3, 1e2, 60
-"""Times the Stribeck velocity: range and number of the points of a sampled curve."""
+"""Range of a sampled curve, relative to the Stribeck velocity, and number of its points."""
 
 
 def transfer_curve(law: str, curve: Model, **own: Any) -> Model:
@@ -34,7 +34,7 @@ def transfer_curve(law: str, curve: Model, **own: Any) -> Model:
     Raises
     ------
     InputError
-        If `curve` has no torque at constant velocity, or does not hold at rest.
+        If `curve` has no torque at constant velocity, or has no friction at rest.
     """
     if curve.law.steady is None:
         raise InputError(
@@ -60,7 +60,7 @@ def static_levels(model: Model) -> tuple[float, float]:
 
 
 def describe_unused(curve: Model, made: Model) -> tuple[str, ...]:
-    """Return notes on what a law made by `transfer_curve` does not have of its model.
+    """Return notes on the parts of its model that a law from `transfer_curve` lacks.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def _options(model: Model, names: tuple[str, ...]) -> dict[str, str]:
 def _sampled(curve: Model, direction: float) -> dict[str, Any]:
     """Return points of a sliding curve in one direction, and its viscous slope if the law has no viscous part."""
     levels, ending = levels_of(curve, direction), "" if direction > 0.0 else NEGATIVE
-    # Below the end of a steep slope through rest the contact would creep; it holds there.
+    # Below the end of a steep slope through rest the contact would creep; the level at rest applies instead.
     slowest = max(FROM * levels.vs, end_of_slope(curve))
     speeds = np.geomspace(slowest, max(TO * levels.vs, 10.0 * slowest), POINTS)
     viscous = _viscous_part(curve, levels.sigma2, ending)

@@ -1,8 +1,8 @@
 """Systematic errors of elements fitted to one loop: cycles that differ, time stamps, encoder counts, torque scale.
 
-A fit to one cycle of many rows with little noise has a covariance of 1e-6 of its values, and its values are wrong by
-a thousand times that: the torque acted half a row earlier, a count stands for all positions within it, the next cycle
-is another, and what the law leaves is no noise but goes on from row to row. Every such part is tried by fitting again.
+A fit to one cycle of many rows with little noise has a covariance far smaller than its true errors: the torque acted up
+to half a row earlier, a count represents all positions within it, the next cycle differs, and the law's residual is
+correlated from row to row. Each effect is evaluated by fitting again.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from stickslip.identification.presliding.hysteresis import Loop, Rows, correlati
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 LINEARITY = 1e-4
-"""Of itself, to which a torque is known at best."""
+"""Least relative uncertainty of a torque."""
 DRAWS = 2
-"""Times that positions and torques are moved within their counts."""
+"""Number of random changes of positions and torques within their counts."""
 FEWEST = 2
-"""Degrees of freedom of the spread of the cycles, at least: of two cycles their difference says more than Student's
-quantile for one would."""
+"""Least degrees of freedom of the spread of the cycles: with two cycles, Student's quantile for one would exaggerate
+the difference."""
 ENDS = 1e-9
-"""Relative decrease of the sum of squares at which a fit ends that starts at the minimum."""
+"""Relative decrease of the sum of squares at which a fit from the minimum stops."""
 
 
 def add_systematic_errors(
@@ -45,13 +45,13 @@ def add_systematic_errors(
     ----------
     loop : Loop
     found : Fit
-        Of ``cycles[0]``.
+        Fit to ``cycles[0]``.
     cycles : sequence of array
         Rows of every full cycle.
     frozen : sequence of str
-        What stays, and
+        Parameters that are held.
     options : mapping
-        how it was fitted: those of `stickslip.identification.presliding.hysteresis.fit_loop`.
+        Options of that fit: those of `stickslip.identification.presliding.hysteresis.fit_loop`.
     """
     if not found.noise.known:
         return found.estimates
@@ -79,10 +79,10 @@ def add_systematic_errors(
 
 
 def correlated_half_widths(found: Fit) -> Array:
-    """Half-widths of 95 % intervals where residuals go on from row to row, shape (parameters,).
+    """Return the half-widths of 95 % intervals for residuals correlated from row to row, shape (parameters,).
 
-    As many residuals count as there are correlation times in the rows. The sum of their correlation to the data's
-    end, which the covariance uses, vanishes for residuals that repeat with the cycle.
+    The number of residuals that count is that of correlation times in the rows. The sum of their correlation to the end
+    of the data, which the covariance uses, vanishes for residuals that repeat with the cycle.
     """
     inverse, _ = inverse_information(found.optimum.jacobian)
     change = found.vector.jacobian(found.u)
@@ -94,7 +94,7 @@ def correlated_half_widths(found: Fit) -> Array:
 def refit(
     loop: Loop, found: Fit, rows: Rows, frozen: Sequence[str], options: Mapping[str, Any]
 ) -> Array | None:
-    """Values of the same fit to other rows or a changed loop, from where it stood; None where others are free there."""
+    """Return the values of the same fit to other rows or a changed loop; None if other parameters are then free."""
     assert found.vector.base is not None
     again, _ = fit_loop(
         loop, found.vector.base, rows, frozen=frozen, starts=found, profiles=False, tolerance=ENDS,
@@ -107,7 +107,7 @@ def refit(
 
 
 def shift_torque(loop: Loop) -> list[Loop]:
-    """The loop with its torque half a row earlier and later: a row does not say when in it the torque acted."""
+    """Return the loop with its torque half a row earlier and later: when it acted within a row is unknown."""
     half = 0.5 * float(np.median(np.diff(loop.time)))
     return [
         replace(loop, torque=np.interp(loop.time + s * half, loop.time, loop.torque)) for s in (-1.0, 1.0)
@@ -115,7 +115,7 @@ def shift_torque(loop: Loop) -> list[Loop]:
 
 
 def dither_counts(loop: Loop) -> list[Loop]:
-    """The loop with positions and torques moved within their counts; none where both are exact."""
+    """Return the loop with positions and torques changed within their counts; none if both are exact."""
     x, y = encoder_step(loop.position), encoder_step(loop.torque)
     if x == 0.0 and y == 0.0:
         return []
@@ -131,7 +131,7 @@ def dither_counts(loop: Loop) -> list[Loop]:
 
 
 def widen_interval(e: Estimate, extra: float, positive: bool, level: float) -> Estimate:
-    """The estimate with another half-width added to its interval: in the logarithm for a positive number."""
+    """Return the estimate with another half-width added to its interval: in the logarithm for a positive number."""
     if not (math.isfinite(e.lower) and math.isfinite(e.upper) and math.isfinite(extra)) or extra == 0.0:
         return e
     std = math.hypot(e.std, extra / 1.96)

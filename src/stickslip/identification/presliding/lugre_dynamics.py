@@ -1,11 +1,11 @@
 """LuGre's sigma0 and sigma1 from an open-loop stick-slip response to a known torque.
 
-Thesis 3.1.3.2.3.1 and 4.3.1.1.4 fit the simulated position to the measured one. Where the law is not exactly the
-friction of the axis, gross sliding dominates that misfit by orders of magnitude and its minimum says nothing about the
-stiffness: for the thesis's own record (0.35 N·m at 1 Hz) it falls for ever with sigma0. So the parts of the record in
-which the axis sticks near zero load are compared for themselves, each relative to its first sample: there the
-displacement is the bristles' alone. Their slope, extrapolated to zero load, is the small-signal stiffness, which needs
-no law at all.
+Thesis 3.1.3.2.3.1 and 4.3.1.1.4 fit the simulated position to the measured one. If the law is not exactly the friction
+of the axis, gross sliding dominates that misfit by orders of magnitude, and its minimum contains no information about
+the stiffness: for the thesis's own record (0.35 N·m at 1 Hz) it decreases with sigma0 without limit. The parts of the
+record in which the axis sticks near zero load are therefore compared separately, each relative to its first sample:
+there the displacement is the bristles' alone. Their slope, extrapolated to zero load, is the small-signal stiffness,
+which requires no law.
 """
 
 from __future__ import annotations
@@ -43,21 +43,23 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 
 NEAR = 0.15
-"""Part of the static torque up to which the load counts as near zero: there LuGre and other laws have one slope."""
+"""Greatest load near zero, part of the static torque: there LuGre and other laws have the same slope."""
 STEP = 2e-4
-"""s, longest step of the simulation, whose error is extrapolated to none from this one and half of it."""
+"""Longest step of the simulation, s; its error is extrapolated to zero from this step and half of it."""
 ROUGH = 1e-3
-"""s, the same while the search is far from its minimum."""
+"""Longest step while the search is far from its minimum, s."""
 ENOUGH = 0.1
-"""Decrease of the sum of squares, in squared standard deviations of a sample, that ends the search."""
+"""Decrease of the sum of squares at which the search stops, in squared standard deviations of a sample."""
 BUSY = (0.1, 10.0)
-"""Times the Stribeck velocity: between these speeds friction falls and rises, and nearly all error is made there."""
+"""Speeds, relative to the Stribeck velocity, between which friction falls and rises and nearly all integration error
+arises."""
 GRADES = ((0.02, STEP), (0.002, 5e-5))
-"""s before and after these speeds, and the longest step there, s; what rings after a stop has died away by then."""
+"""Times before and after these speeds, s, and the longest step within them, s; ringing after a stop has decayed by
+then."""
 COARSER = 4.0
-"""Times these steps where only the displacements of parts that stick count: they keep 10 digits of a turn then."""
+"""Factor on these steps if only the displacements of sticking parts count, for which they are accurate enough."""
 DIFFERENCE = 1e-3
-"""Of the coordinates, for Jacobians: where a reversal falls between two steps leaves the simulation 7 digits."""
+"""Step of the coordinates for Jacobians: the place of a reversal between two steps limits the precision to 7 digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +69,7 @@ class Response:
     Attributes
     ----------
     time, torque, position : array, shape (n,)
-        s, strictly ascending; motor torque in N·m, smooth from sample to sample; rad.
+        s, strictly increasing; motor torque in N·m, smooth from sample to sample; rad.
     """
 
     time: Array
@@ -82,16 +84,16 @@ class Response:
 
     @classmethod
     def of(cls, record: Record, torque: str = "motor_torque") -> Response:
-        """The channels of a record; of samples at the same time the first is kept."""
+        """Build the response from the channels of a record; of samples at the same time the first is kept."""
         kept = np.concatenate([[True], np.diff(record.time) > 1e-9])
         return cls(record.time[kept], record[torque][kept], record["position"][kept])
 
 
 def sticking_pieces(response: Response, fs: float) -> list[Rows]:
-    """Runs of samples in which the load is near zero and the axis sticks, at least 4 samples each.
+    """Return runs of samples in which the load is near zero and the axis sticks, at least 4 samples each.
 
-    It sticks where the position changes by less than would a spring a hundred times softer than the softest the
-    record's own quiet parts show.
+    The axis sticks if its position changes less than that of a spring a hundred times softer than the softest in the
+    record's quiet parts.
     """
     quiet = np.abs(response.torque) <= NEAR * fs
     rate = np.abs(np.gradient(response.position, response.time))
@@ -104,10 +106,10 @@ def sticking_pieces(response: Response, fs: float) -> list[Rows]:
 
 
 def small_signal_stiffness(response: Response, fs: float, noise: Noise | None = None) -> Estimate:
-    """Slope of the load over the displacement at zero load, from the parts in which the axis sticks, N·m/rad.
+    """Estimate the slope of the load over the displacement at zero load from the sticking parts, N·m/rad.
 
-    Every part has its own mean; the compliance is taken as constant plus a term linear in the load's size, so that
-    softening near break-away does not enter.
+    Every part has its own mean; the compliance is a constant plus a term linear in the load's magnitude, which removes
+    the effect of softening near break-away.
     """
     pieces = sticking_pieces(response, fs)
     if not pieces:
@@ -138,13 +140,13 @@ def small_signal_stiffness(response: Response, fs: float, noise: Noise | None = 
 
 
 def pseudo_inverse(matrix: Any) -> Any:
-    """numpy's, whose types leave the rest unknown."""
+    """Return numpy's pseudo-inverse, whose types are unknown."""
     inverse: Any = np.linalg.pinv
     return inverse(matrix)
 
 
 def lugre_vector(curve: Model, sigma0: float, sigma1: float, most: float = math.inf) -> Vector:
-    """LuGre with the sliding curve of another law, frozen, and sigma1 at most `most`."""
+    """Return LuGre with the sliding curve of another law, frozen, and sigma1 at most `most`."""
     model = transfer_curve("lugre", curve, sigma0=sigma0, sigma1=sigma1)
     return Vector(model, free=["sigma0", "sigma1"], limits={"sigma1": (0.0, most)})
 
@@ -155,11 +157,11 @@ def stribeck_velocity(curve: Model) -> float:
 
 
 class Simulation:
-    """The axis under the record's torque, ready to be run with any sigma0, sigma1.
+    """The axis under the record's torque, which can be simulated with any sigma0 and sigma1.
 
-    LuGre's friction is smooth but for its slope at zero velocity, so that the error of the second-order step falls
-    with its square; two runs, one with half the step of the other, take that part away (Richardson 1911).
-    ``longest`` is the longest step, s, between all samples or between each two.
+    LuGre's friction is smooth except for its slope at zero velocity, so the error of the second-order step decreases
+    with its square; two runs, one with half the step of the other, eliminate it (Richardson 1911). ``longest`` is the
+    longest step, s, between all samples or between each two.
     """
 
     def __init__(
@@ -173,8 +175,8 @@ class Simulation:
         first = np.repeat(np.arange(parts.size), parts)
         inside = (np.arange(first.size) - self.rows[first]) / parts[first]
         time = np.append(response.time[first] + inside * period[first], response.time[-1])
-        # Chords of a sine at 1 kHz lose 3e-6 of it, which a slip makes into 1e-5 rad: both follow the bend, so that
-        # what is left of it is taken away too.
+        # Linear interpolation of a fast sine loses a little of it, which a slip amplifies: both runs follow the
+        # curvature, and the extrapolation removes the rest.
         bend = Akima1DInterpolator(response.time, response.torque, method="makima")
         start = (float(response.position[0]), 0.0)
         self.coarse, self.fine = (
@@ -183,25 +185,25 @@ class Simulation:
         )
 
     def position(self, u: Array) -> Array:
-        """rad, at the times of the record."""
+        """Return the positions at the times of the record, rad."""
         parameters = self.vector.law_parameters(u)
-        # Side by side, the long one by the caller.
+        # In parallel, the long one by the caller.
         coarse, fine = mapped(lambda c: c.run(self.mechanics, parameters)[:, 0], (self.coarse, self.fine))
         ends = fine[2 * self.rows]
         return ends + (ends - coarse[self.rows]) / 3.0
 
     def graded(self, u: Array, vs: float, coarser: float = 1.0) -> Simulation:
-        """The same with steps as short as the motion at u asks for, times `coarser`."""
+        """Return the simulation with steps as short as the motion at u requires, times `coarser`."""
         velocity = self.fine.run(self.mechanics, self.vector.law_parameters(u))[2 * self.rows, 1]
         longest = coarser * graded(self.response, velocity, vs)
         return Simulation(self.response, self.vector, self.mechanics.inertia, longest)
 
 
 def misfit(response: Response, simulation: Simulation) -> Residuals:
-    """Simulated minus measured position at the vector's coordinates, rad, without its mean.
+    """Return simulated minus measured position at the vector's coordinates, rad, without its mean.
 
-    The simulation starts at the first sample, whose noise would else shift all of it; friction does not depend on the
-    position, so that a free offset is the mean.
+    The simulation starts at the first sample, whose noise would otherwise shift all of it; friction does not depend on
+    the position, so a free offset is the mean.
     """
 
     def difference(u: Array) -> Array:
@@ -212,14 +214,14 @@ def misfit(response: Response, simulation: Simulation) -> Residuals:
 
 
 def with_middles(values: Array) -> Array:
-    """The values with the middle of every two between them."""
+    """Return the values with the midpoints between them."""
     out = np.zeros(2 * values.size - 1)
     out[::2], out[1::2] = values, 0.5 * (values[:-1] + values[1:])
     return out
 
 
 def graded(response: Response, velocity: Array, vs: float) -> Array:
-    """Longest steps between the samples, s: short where the axis breaks away or comes to rest, shape (n - 1,)."""
+    """Return the longest steps between the samples, s: short around break-away and stops, shape (n - 1,)."""
     speed, time = np.abs(velocity), response.time
     busy = time[(speed > BUSY[0] * vs) & (speed < BUSY[1] * vs)]
     longest = np.full(time.size - 1, ROUGH)
@@ -232,7 +234,7 @@ def graded(response: Response, velocity: Array, vs: float) -> Array:
 
 
 def squares_of(vector: Vector, residuals: Residuals) -> Squares:
-    """The residuals between the bounds of the vector."""
+    """Return the residuals with the bounds of the vector."""
     return Squares(residuals, vector.lower, vector.upper, DIFFERENCE)
 
 
@@ -240,14 +242,14 @@ def fit_position(
     response: Response, inertia: float, curve: Model, *, sigma0: float, sigma1: float,
     noise: Noise | float | None = None, profiles: bool = True,
 ) -> Fit:  # fmt: skip
-    """Plain output error: least squares of the simulated position, all samples alike, where it starts left free.
+    """Fit by plain output error: least squares of the simulated position, all samples equal, with a free start.
 
-    Thesis 3.1.3.2.3.1, without the free start.
-    Right where the friction is LuGre's; where it is not, see `identify_lugre_dynamics`.
+    Thesis 3.1.3.2.3.1, but with a free start. Correct if the friction is LuGre's; otherwise see
+    `identify_lugre_dynamics`.
     """
     vector, vs = lugre_vector(curve, sigma0, sigma1), stribeck_velocity(curve)
     rough = Simulation(response, vector, inertia, ROUGH)
-    # sigma0 alone first: far from the minimum sigma1 would be driven to 0, which it leaves slowly.
+    # sigma0 alone first: far from the minimum sigma1 would be driven to 0, from which it recovers slowly.
     near, _ = descend_by_secants(
         squares_of(vector, misfit(response, rough)), vector.start, held=[vector.names.index("sigma1")], tolerance=0.1
     )  # fmt: skip
@@ -267,7 +269,7 @@ def fit_position(
         tolerance=enough,
         difference=DIFFERENCE,
     )
-    # What exceeds the noise is error of the model or the simulation, and correlated.
+    # A residual above the noise is an error of the model or the simulation, and correlated.
     lags = correlation_lags(first.optimum.residuals) if known is None or first.rms > 1.1 * known.std else 0
     if not profiles and lags == 0:
         return first
@@ -280,7 +282,7 @@ def fit_position(
 def fit_bristles(
     response: Response, simulation: Simulation, pieces: Sequence[Rows], vs: float, noise: Noise | None
 ) -> Fit:
-    """Fit of the displacements within the parts that stick, each without its mean; vs in rad/s."""
+    """Fit the displacements within the sticking parts, each without its mean; vs in rad/s."""
     vector = simulation.vector
 
     def bristles(position: Array) -> Array:
@@ -297,7 +299,7 @@ def fit_bristles(
             squares_of(vector, apart(simulation.graded(u, vs, COARSER))), u, tolerance=enough
         )
 
-    # sigma1 hardly matters here, and may end at either of its bounds.
+    # sigma1 hardly matters here, and may reach either of its bounds.
     undamped = vector.start.copy()
     undamped[vector.names.index("sigma1")] = 0.0
     near = min((descended(u) for u in (vector.start, undamped)), key=lambda found: found[1])[0]
@@ -308,7 +310,7 @@ def fit_bristles(
 
 
 def left_open(found: Fit) -> list[str]:
-    """What this record cannot tell."""
+    """Return notes on the parameters that this record does not determine."""
     notes: list[str] = []
     if any(e.name == "sigma1" and not e.identified for e in found.estimates):
         notes.append(
@@ -324,24 +326,23 @@ def left_open(found: Fit) -> list[str]:
 def identify_lugre_dynamics(
     response: Response, inertia: float, curve: Model, *, noise: Noise | float | None = None,
 ) -> Identification:  # fmt: skip
-    """Find sigma0 and sigma1 from an open-loop stick-slip response, its pre-sliding parts weighted for themselves.
+    """Identify sigma0 and sigma1 from an open-loop stick-slip response, with its pre-sliding parts weighted separately.
 
     Parameters
     ----------
     response : Response
     inertia : float
-        kg·m²
+        Inertia, kg·m².
     curve : Model
-        Any law with the sliding curve, identified before: of any shape, symmetric or for each direction.
+        Any law with the previously identified sliding curve: of any shape, symmetric or for each direction.
     noise : Noise or float, optional
         Standard deviation of a position, rad; else from the residual in the pre-sliding parts.
 
     Returns
     -------
     Identification
-        Estimates sigma0, sigma1 and stiffness (small-signal, without a law). ``details["scan"]`` holds the plain
-        position misfit over sigma0, and ``details["plain_determines_sigma0"]`` whether that has a minimum worth
-        the name.
+        Estimates sigma0, sigma1 and stiffness (small-signal, without a law). ``details["scan"]`` contains the plain
+        position misfit over sigma0, and ``details["plain_determines_sigma0"]`` whether that has a distinct minimum.
 
     Raises
     ------
@@ -351,7 +352,7 @@ def identify_lugre_dynamics(
     known, fs = as_noise(noise), min(static_levels(curve))
     stiffness = small_signal_stiffness(response, fs, known)
     begin = stiffness.value if math.isfinite(stiffness.value) else 1e4
-    # Beyond critical damping bristles would be no springs; this record could not tell.
+    # Above critical damping bristles would not act as springs, which this record could not show.
     critical = 2.0 * math.sqrt(begin * inertia)
     vector = lugre_vector(curve, begin, 0.1 * critical, critical)
     simulation = Simulation(response, vector, inertia)

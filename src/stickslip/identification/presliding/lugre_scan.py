@@ -1,7 +1,7 @@
-"""Whether the whole position of an open-loop response determines LuGre's sigma0: the misfit scanned over it.
+"""Scan of the misfit over LuGre's sigma0: whether the whole position of an open-loop response determines it.
 
-Where friction is not exactly LuGre's, gross sliding dominates the plain misfit of thesis 3.1.3.2.3.1: it has no
-minimum, or one far from the stiffness of the parts that stick. The scan shows which, and the verdict says it.
+If friction is not exactly LuGre's, gross sliding dominates the plain misfit of thesis 3.1.3.2.3.1: it has no minimum,
+or one far from the stiffness of the sticking parts. The scan and its verdict show which.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from stickslip.identification.fit.uncertainty import Fit
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SCAN = np.geomspace(0.02, 50.0, 18)
-"""Multiples of the small-signal stiffness at which the plain position misfit is looked at."""
+"""Multiples of the small-signal stiffness at which the plain position misfit is evaluated."""
 FLAT = 1.1
-"""Misfits within this factor are not told apart."""
+"""Ratio of misfits below which they are not distinguished."""
 
 
 def plain_scan(measured: Array, simulated: Callable[[Array], Array], found: Fit) -> Array:
-    """Misfit of the whole position over sigma0.
+    """Compute the misfit of the whole position over sigma0.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def plain_scan(measured: Array, simulated: Callable[[Array], Array], found: Fit)
     simulated : callable
         ``simulated(u)``: the positions at the coordinates u of ``found.vector``, rad, shape (n,).
     found : Fit
-        Whose sigma0 is multiplied by every factor of `SCAN`.
+        Its sigma0 is multiplied by every factor of `SCAN`.
 
     Returns
     -------
@@ -50,7 +50,7 @@ def plain_scan(measured: Array, simulated: Callable[[Array], Array], found: Fit)
 
 
 def plain_verdict(scan: Array, sigma0: float) -> tuple[bool, str]:
-    """Whether the plain misfit has a minimum at the pre-sliding stiffness, and the sentence that says so."""
+    """Return whether the plain misfit has a minimum at the pre-sliding stiffness, and a sentence on it."""
     finite = scan[np.isfinite(scan[:, 1])]
     best = int(np.argmin(finite[:, 1]))
     near = finite[finite[:, 1] <= FLAT * finite[best, 1], 0]
@@ -79,7 +79,7 @@ def plain_verdict(scan: Array, sigma0: float) -> tuple[bool, str]:
 
 
 def response_picture(time: Array, measured: Array, simulated: Array) -> Picture:
-    """Measured and simulated position (thesis figures 3.12, 4.13, 4.37)."""
+    """Draw measured and simulated position (thesis figures 3.12, 4.13, 4.37)."""
     error = float(np.sqrt(np.mean((simulated - measured) ** 2)))
     time, origin = time - time[0], measured[0]
     traces = (Trace("measured", time, measured - origin), Trace("LuGre", time, simulated - origin))
@@ -91,7 +91,7 @@ def response_picture(time: Array, measured: Array, simulated: Array) -> Picture:
 
 
 def scan_picture(scan: Array, sigma0: float) -> Picture:
-    """The plain position misfit over sigma0, and the stiffness of the pre-sliding parts."""
+    """Draw the plain position misfit over sigma0, and the stiffness of the pre-sliding parts."""
     traces = (
         Trace("position misfit", scan[:, 0], scan[:, 1]),
         Trace("pre-sliding parts", np.array([sigma0]), np.array([math.nan]), "vertical"),

@@ -1,10 +1,9 @@
 """Pre-sliding hysteresis: stiffness and shares of the elements of GMS from loops of torque over displacement.
 
 Thesis 3.1.3.2.4.1 (displacement 3.21, three equal elements) and 4.3.1.1.3 (sinusoidal torque below break-away, second
-cycle fitted, since the first one contains the transient from the unknown initial state). A Maxwell-slip model is
-linear in its stiffnesses once the displacements at which elements slip are chosen: non-negative least squares on a
-grid of them gives the shape, neighbours are merged to the number of elements wanted, and the law itself is then
-fitted.
+cycle fitted, since the first one contains the transient from the unknown initial state). A Maxwell-slip model is linear
+in its stiffnesses for given slip displacements of the elements: non-negative least squares on a grid of them gives the
+shape, neighbours are merged to the requested number of elements, and the law itself is then fitted.
 """
 
 from __future__ import annotations
@@ -42,24 +41,24 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Rows = np.ndarray[Any, np.dtype[np.intp]]
 
 GRID = 30
-"""Displacements at which elements of the first, linear fit slip."""
+"""Slip displacements of the first, linear fit."""
 MOST = 6
-"""Elements up to which the automatic choice looks."""
+"""Most elements of the automatic choice."""
 LAG, TURNED = 5e-3, 0.02
-"""s by which torque and position may be apart, by sampling, converters and filters; and the angle by which such a lag
-turns a loop, rad, from which on it is fitted along."""
+"""Greatest lag between torque and position due to sampling, converters and filters, s; least rotation of a loop by such
+a lag, rad, for which it is fitted."""
 RESOLVED = 0.005
-"""Of the travel to either side, within which an element that slips shows a torque but no stiffness."""
+"""Part of the travel to either side, within which a slipping element shows a torque but no stiffness."""
 ATTRACTION = 24.0
-"""N·m/s, thesis Table 1."""
+"""Attraction parameter of thesis Table 1, N·m/s."""
 ENOUGH = 1.1
-"""Fewest elements whose loop error is within this factor of the best."""
+"""Ratio to the best loop error within which the fewest elements are chosen."""
 
 
 def cycles(position: Array) -> list[Rows]:
-    """Rows of the cycles between turning points on the same side; what comes before the first one is left out.
+    """Return the rows of the cycles between turning points on the same side, without those before the first one.
 
-    Where there are three or more, the first one is left out too: it contains the transient.
+    If there are three or more, the first one is left out too: it contains the transient.
     """
     turns = turning_points(position)
     bounds = turns[::2]
@@ -70,7 +69,7 @@ def cycles(position: Array) -> list[Rows]:
 
 
 def stops_of(position: Array, thresholds: Array) -> Array:
-    """Deflection of a spring that slips at each threshold, along the motion, shape (n, thresholds)."""
+    """Return the deflection of a spring that slips at each threshold, along the motion, shape (n, thresholds)."""
     out = np.zeros((position.size, thresholds.size))
     for i in range(1, position.size):
         out[i] = np.clip(out[i - 1] + (position[i] - position[i - 1]), -thresholds, thresholds)
@@ -78,7 +77,7 @@ def stops_of(position: Array, thresholds: Array) -> Array:
 
 
 def maxwell_start(loop: Loop, rows: Rows, elements: int) -> tuple[Array, Array]:
-    """Stiffnesses (N·m/rad) and slip displacements (rad) of a Maxwell-slip model with at most so many elements."""
+    """Return stiffnesses (N·m/rad) and slip displacements (rad) of a Maxwell-slip model of `elements` elements."""
     optimize: Any = importlib.import_module("scipy.optimize")
     reach = 0.5 * float(np.ptp(loop.position[rows]))
     grid = reach * np.geomspace(0.02, 1.0, GRID)
@@ -93,7 +92,7 @@ def maxwell_start(loop: Loop, rows: Rows, elements: int) -> tuple[Array, Array]:
         raise InputError("the torque does not grow with the displacement; this is no pre-sliding loop")
     k, x = stiffness[kept], grid[kept]
     while k.size > elements:
-        # Merge the two neighbours that lie closest; stiffness and slip torque are kept.
+        # Merge the two closest neighbours; stiffness and slip torque are kept.
         i = int(np.argmin(np.diff(np.log(x))))
         both = float(k[i] + k[i + 1])
         x[i + 1] = (k[i] * x[i] + k[i + 1] * x[i + 1]) / both
@@ -108,7 +107,7 @@ def maxwell_start(loop: Loop, rows: Rows, elements: int) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Setup:
-    """What a fit of elements holds and fits in addition to them.
+    """Values that a fit of elements holds, and terms that it fits in addition.
 
     Attributes
     ----------
@@ -123,7 +122,7 @@ class Setup:
     damping : float
         Bound of a fitted torque in step with the velocity, N·m·s/rad; 0: none is fitted.
     noise : Noise or None
-        Of the torque.
+        Noise of the torque.
     """
 
     curve: Model
@@ -139,7 +138,7 @@ class Setup:
         return {"offset": self.offset, "damping": self.damping}
 
     def frozen(self, template: Model) -> list[str]:
-        """Return what pre-sliding loops do not determine: everything but k, and alpha unless all are equal."""
+        """Return the parameters that pre-sliding loops do not determine: all but k, and alpha unless all are equal."""
         free = {"k"} if self.equal else {"k", "alpha"}
         return [f.name for f in template.law.fields if f.name not in free]
 
@@ -154,7 +153,7 @@ class Setup:
         else:
             fs = sum(static_levels(self.curve)) / 2.0
             level = np.maximum(k * x, 0.02 * fs)
-            # What the loop does not load to its limit takes up the rest of the static torque.
+            # An element that the loop does not load to its limit receives the rest of the static torque.
             level[int(np.argmax(x))] += max(fs - float(np.sum(level)), 0.0)
             alpha = level / np.sum(level)
         return transfer_curve("gms", self.curve, k=k.tolist(), alpha=alpha.tolist(), c=self.c)
@@ -176,28 +175,29 @@ def identify_presliding(
     Parameters
     ----------
     loop : Loop
-        Pre-sliding motion, two cycles or more; the first full one after the transient is fitted, the others test.
+        Pre-sliding motion, two cycles or more; the first full one after the transient is fitted, the others are the
+        test.
     curve : Model
-        Any law with the sliding curve, identified before: of any shape, symmetric or for each direction.
+        Any law with the previously identified sliding curve: of any shape, symmetric or for each direction.
     elements : int
-        Their number; 0 takes the fewest that predict the other cycles nearly as well as any.
+        Number of elements; 0 for the fewest that predict the other cycles nearly as well as any.
     shares : {"free", "equal"}
-        Whether each element has its own share alpha of the curve, or all the same (thesis Tables 1 and 5).
+        Whether each element has its own share alpha of the curve, or all have the same (thesis Tables 1 and 5).
     c : float, optional
-        Attraction parameter, N·m/s, which hardly acts in pre-sliding; that of `curve`, or of thesis Table 1.
+        Attraction parameter, N·m/s, which hardly acts in pre-sliding; None for that of `curve`, or of thesis Table 1.
     noise : Noise or float, optional
-        Standard deviation of a sample, N·m; else from the residual, with its correlation. Cycles that differ, a half
-        row of lag, counts and the torque's scale widen the intervals beside it.
+        Standard deviation of a sample, N·m; else from the residual, with its correlation. Differing cycles, half a row
+        of lag, counts and the torque's scale also widen the intervals.
     offset : bool
-        Whether a constant torque is fitted along.
+        Whether a constant torque is fitted.
     inertia : float
-        kg·m² between where the torque is measured and the contact: what accelerates it is no friction.
+        Inertia between the torque measurement and the contact, kg·m²: the torque that accelerates it is not friction.
 
     Returns
     -------
     Identification
-        ``misfit["held_out_relative"]`` is the loop error on cycles not fitted; ``details["loop_errors"]`` those of the
-        other numbers of elements that were tried.
+        ``misfit["held_out_relative"]`` is the loop error on cycles that were not fitted; ``details["loop_errors"]``
+        those of the other numbers of elements tried.
 
     Raises
     ------
@@ -215,8 +215,8 @@ def identify_presliding(
         raise InputError("no full cycle of displacement; record at least two cycles of a slow sinusoid")
     rows = found[0]
     rest = np.concatenate(found[1:]) if len(found) > 1 else np.zeros(0, dtype=np.intp)
-    # A lag of the torque makes it lead or follow the velocity, which the elements would take for a stiffness without
-    # bound: the faster the loop the more.
+    # A lag of the torque makes it lead or follow the velocity, which elements would represent as an unbounded
+    # stiffness: the faster the loop, the more.
     cycle = float(straight.time[rows[-1]] - straight.time[rows[0]])
     damping = LAG * float(np.ptp(straight.torque[rows]) / np.ptp(straight.position[rows]))
     damping = damping if 2.0 * math.pi * LAG > TURNED * cycle else 0.0
@@ -253,7 +253,7 @@ def identify_presliding(
 
 
 def fitted_elements(loop: Loop, rows: Rows, elements: int, setup: Setup) -> tuple[Fit, Along]:
-    """The law's elements fitted from several starts, then with the residuals' own correlation."""
+    """Fit the law's elements from several starts, then with the residuals' own correlation."""
     template = setup.start(loop, rows, elements)
     options: dict[str, Any] = {"frozen": setup.frozen(template), "noise": setup.noise, **setup.fitted}
     first, _ = fit_loop(loop, template, rows, starts=6, profiles=False, reach=0.7, **options)
@@ -263,14 +263,14 @@ def fitted_elements(loop: Loop, rows: Rows, elements: int, setup: Setup) -> tupl
 
 
 def stiffest_of(model: Model, loop: Loop, rows: Rows) -> list[int]:
-    """Elements that slip within `RESOLVED` of the travel."""
+    """Return the elements that slip within `RESOLVED` of the travel."""
     p, fs = model.parameters, min(static_levels(model))
     reach = 0.5 * float(np.ptp(loop.position[rows]))
     return [i for i in range(len(p.k)) if p.alpha[i] * fs < RESOLVED * reach * p.k[i]]
 
 
 def stiffest_first(vector: Vector, u: Array) -> Array:
-    """The same elements, numbered from the stiffest to the softest."""
+    """Return the same elements, numbered from the stiffest to the softest."""
     named = vector.named(u)
     count = sum(1 for name in named if name.startswith("k["))
     order = sorted(range(count), key=lambda i: -named[f"k[{i}]"])
@@ -281,7 +281,7 @@ def stiffest_first(vector: Vector, u: Array) -> Array:
 
 
 def loop_errors(loop: Loop, rows: Rows, test: Rows, setup: Setup) -> dict[int, float]:
-    """Relative error on the test rows by the number of elements."""
+    """Return the relative error on the test rows by the number of elements."""
     out: dict[int, float] = {}
     for n in range(1, MOST + 1):
         template = setup.start(loop, rows, n)
@@ -289,12 +289,12 @@ def loop_errors(loop: Loop, rows: Rows, test: Rows, setup: Setup) -> dict[int, f
                                  reach=0.7, **setup.fitted)  # fmt: skip
         out[n] = relative_error(loop, curve_of(along, fitted.vector, fitted.u), test)
         if n > 2 and out[n] > 0.97 * min(out[m] for m in range(1, n)):
-            break  # one element more no longer helps
+            break  # one more element no longer helps
     return out
 
 
 def loop_notes(loop: Loop, model: Model, rows: Rows, rest: Rows) -> tuple[str, ...]:
-    """What the loop does not show."""
+    """Return notes on what the loop does not show."""
     p, fs = model.parameters, max(static_levels(model))
     reach = 0.5 * float(np.ptp(loop.position[rows]))
     idle = [i for i in range(len(p.k)) if p.alpha[i] * fs / p.k[i] > reach]

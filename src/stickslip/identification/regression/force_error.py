@@ -1,5 +1,4 @@
-"""How far the torque of a model is from the torque that was measured: the figure by which identifications are
-compared."""
+"""Deviation of a model's torque from the measured torque: the criterion by which identifications are compared."""
 
 from __future__ import annotations
 
@@ -19,21 +18,21 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def force_error(inverse: InverseDynamics, model: Model, axis_values: Mapping[str, float]) -> float:
-    """Norm of the torque that a model leaves of the measured one, over the norm of the latter.
+    """Return the norm of the measured torque that a model does not explain, over the norm of the torque.
 
     Parameters
     ----------
     inverse : InverseDynamics
         The record's filtered and decimated torque and motion (Janot, Gautier and Brunot 2019, relative error).
     model : Model
-        A law that says its torque at constant velocity.
+        A law with a torque at constant velocity.
     axis_values : mapping
         ``inertia``, ``offset``; of a pendulum ``gravity``, ``gravity_angle``.
 
     Returns
     -------
     float
-        Not a number for a law without a steady torque.
+        NaN for a law without a steady torque.
     """
     if model.law.steady is None:
         return math.nan
@@ -42,9 +41,9 @@ def force_error(inverse: InverseDynamics, model: Model, axis_values: Mapping[str
 
 
 def model_torque(inverse: InverseDynamics, model: Model, axis_values: Mapping[str, float]) -> Array:
-    """The torque of a model along the motion of the inverse dynamics, N·m (N), shape (n,), as `force_error` takes it.
+    """Return the torque of a model along the motion of the inverse dynamics, N·m (N), shape (n,).
 
-    The arguments are those of `force_error`; the law must say its torque at constant velocity.
+    The arguments are those of `force_error`; the law must have a torque at constant velocity.
     """
     assert model.law.steady is not None
     torque = np.zeros(inverse.torque.size)
@@ -56,7 +55,7 @@ def model_torque(inverse: InverseDynamics, model: Model, axis_values: Mapping[st
     for name, value in effects.items():
         if inverse.has(name):
             torque += value * inverse.matrix[:, inverse.names.index(name)]
-    # Level and slope as the decimation filter leaves them; what a curve has beside is taken at the velocity itself.
+    # Level and slope after the decimation filter; the curve's other parts are taken at the velocity itself.
     sliding = inverse.matrix[:, inverse.names.index("fc")]
     steady = np.array([model.law.steady(float(x), model.parameters) for x in inverse.velocity])
     level = getattr(model.parameters, "fc", inverse.coulomb)
@@ -67,10 +66,10 @@ def force_error_on(
     experiments: Sequence[Experiment], axis: ServoAxis, model: Model, axis_values: Mapping[str, float],
     cutoff: float | None = None,
 ) -> float:  # fmt: skip
-    """The same on records; not a number where they hold too little motion.
+    """Return the force error on records; NaN if they contain too little motion.
 
-    `cutoff`, Hz, is that of another inverse dynamics with whose error this one is compared: errors in another band are
-    other errors.
+    `cutoff`, Hz, is that of another inverse dynamics to which this error is compared: errors in different bands are not
+    comparable.
     """
     try:
         return force_error(inverse_dynamics(experiments, axis, cutoff=cutoff), model, axis_values)
@@ -79,8 +78,7 @@ def force_error_on(
 
 
 def plain_error_on(experiments: Sequence[Experiment], axis: ServoAxis, found: InverseDynamics) -> float:
-    """Relative error of the plain inverse dynamics on records that it was not fitted to; not a number where too
-    short."""
+    """Return the relative error of the plain inverse dynamics on records not fitted; NaN if these are too short."""
     try:
         there = inverse_dynamics(experiments, axis, per_direction=found.has("fc_plus"), cutoff=found.cutoff)
     except InputError:

@@ -2,10 +2,10 @@
 
 T = M dv/dt + Fv v + Fc sign(v) + offset (+ m g l sin(q - q0), + a Fourier series in the position), where velocity and
 acceleration come from the position by a zero-phase Butterworth low-pass and central differences, and both sides pass
-the same decimation filter: Gautier (1997), Janot, Gautier and Brunot (2019). With friction of its own for each
-direction, Fv+, Fc+, Fv-, Fc- take the place of Fv, Fc and the offset.
+the same decimation filter: Gautier (1997), Janot, Gautier and Brunot (2019). With separate friction for each direction,
+Fv+, Fc+, Fv-, Fc- replace Fv, Fc and the offset.
 
-Where the record is irregular it is put on a regular grid first.
+An irregular record is first resampled on a regular grid.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 HIGHEST_CUTOFF = 100.0  # Hz, of the position's low-pass, as published for EMPS
 CUTOFF_PER_RATE = 0.1
-BAND_PER_CUTOFF = 0.4  # of the cutoff: the band that is kept after decimation
-HIGHEST_PER_RATE = 0.25  # of a short record's low-pass
-MOST_ENDS = 1.0 / 3.0  # of a record that the filters may take at both ends together
+BAND_PER_CUTOFF = 0.4  # part of the cutoff that is kept after decimation
+HIGHEST_PER_RATE = 0.25  # corner of a short record's low-pass, part of the sample rate
+MOST_ENDS = 1.0 / 3.0  # greatest part of a record that the filters may use at both ends together
 TAPER = 10.0  # periods of the cutoff left out at both ends, where the filters have not settled
 NOISE_SHARE = 0.01  # largest share of noise in the acceleration's power
-SPARSE = 100.0  # times as many rows on a regular grid as there are samples, at most
-DEAD_ZONE = 3.0  # standard deviations of the velocity's noise, below which its sign means nothing
-OTHERS = 7  # parameters beside those of harmonics, about
-SECONDS = 6e-6  # s, that a fit by simulation takes a sample and square of the number of parameters
+SPARSE = 100.0  # greatest ratio of rows on a regular grid to samples
+DEAD_ZONE = 3.0  # standard deviations of the velocity's noise, below which its sign is meaningless
+OTHERS = 7  # approximate number of parameters besides those of harmonics
+SECONDS = 6e-6  # s per sample and squared number of parameters of a fit by simulation
 MOST_HOURS = 24.0
-MOST_BYTES = 8e9  # of the equations
+MOST_BYTES = 8e9  # most memory of the equations
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +56,13 @@ class InverseDynamics:
     robust_std : array, shape (p,)
         With the correlation of the residuals (Newey and West 1987).
     covariance : array, shape (p, p)
-        The robust one.
+        The robust covariance.
     relative_error : float
         Norm of the residual torque over the norm of the torque.
     cutoff, band : float
-        Hz.
+        Cutoff of the low-pass and band after decimation, Hz.
     matrix, torque, residual, time, velocity, position : array
-        The decimated system and where it was taken.
+        The decimated system, with its times, velocities and positions.
     """
 
     names: tuple[str, ...]
@@ -85,13 +85,13 @@ class InverseDynamics:
         return float(self.values[self.names.index(name)])
 
     def numbers(self) -> dict[str, float]:
-        """Inertia, slope, level, offset and a pendulum's gravity by their names in gross sliding."""
+        """Return inertia, slope, level, offset and a pendulum's gravity by their names in gross sliding."""
         gravity = {n: self[n] for n in ("gravity_sin", "gravity_cos") if self.has(n)}
         own = {"inertia": self["inertia"], "sigma2": self.viscous, "fc": self.coulomb, "offset": self.offset}
         return own | gravity
 
     def has(self, name: str) -> bool:
-        """Whether it estimated that parameter."""
+        """Return whether that parameter was estimated."""
         return name in self.names
 
     @property
@@ -132,14 +132,14 @@ def inverse_dynamics(
     experiments : sequence of Experiment
     axis : ServoAxis
     per_direction : bool
-        Friction of its own for each direction of motion.
+        Whether friction has separate parameters for each direction of motion.
     cutoff : float, optional
-        Corner of the position's low-pass, Hz. Otherwise the lowest of 100 Hz, a tenth of the sample rate, and
-        where noise would make up 1 % of the acceleration's power.
+        Corner of the position's low-pass, Hz. If None, the lowest of 100 Hz, a tenth of the sample rate, and the corner
+        at which noise would be 1 % of the acceleration's power.
     harmonics : int
-        Harmonics of a torque that depends on the position.
+        Number of harmonics of a torque that depends on the position.
     harmonic_period : float
-        rad (m) after which it repeats.
+        Period of the harmonics, rad (m).
     held : mapping of str to float, optional
         Values of parameters, by name, that are known and not fitted; their variance is 0.
 
@@ -150,7 +150,7 @@ def inverse_dynamics(
     Raises
     ------
     InputError
-        If the records move too little to tell the parameters apart.
+        If the records move too little to distinguish the parameters.
     """
     insist_on_motion(experiments)
     refuse_harmonics(experiments, harmonics)
@@ -196,7 +196,7 @@ def inverse_dynamics(
 
 
 def _undetermined(names: Sequence[str], w: Array, size: Array) -> str:
-    """What rows `w` without full rank do not tell, in words; `size` is the norm of each column."""
+    """Return as text what the rank-deficient rows `w` do not determine; `size` are the norms of the columns."""
     still = [n for n, s in zip(names, size, strict=True) if s == 0.0]
     if still:
         return f"nothing excites {', '.join(still)}"
@@ -206,7 +206,7 @@ def _undetermined(names: Sequence[str], w: Array, size: Array) -> str:
 
 
 def _level(tied: str) -> str:
-    """Return what else separates friction from a constant torque, to end an error about both; else an empty text."""
+    """Return the other way to separate friction from a constant torque, to end an error on both; else an empty text."""
     return (
         f", or give {name_frozen('offset', 0)} if no constant torque acts (a level axis)"
         if "offset" in tied
@@ -215,7 +215,7 @@ def _level(tied: str) -> str:
 
 
 def refuse_harmonics(experiments: Sequence[Experiment], harmonics: int, *, simulated: bool = False) -> None:
-    """Refuse more harmonics than the samples can tell apart, before a column is made for each.
+    """Refuse more harmonics than the samples can distinguish, before a column is made for each.
 
     Parameters
     ----------
@@ -223,12 +223,12 @@ def refuse_harmonics(experiments: Sequence[Experiment], harmonics: int, *, simul
     harmonics : int
         Each has two parameters.
     simulated : bool
-        Whether simulations are fitted: their time goes with the square of the number of parameters.
+        Whether simulations are fitted: their time is proportional to the square of the number of parameters.
 
     Raises
     ------
     InputError
-        With the number of parameters, the memory or the time, and how many harmonics may be given.
+        With the number of parameters, the memory or the time, and the greatest possible number of harmonics.
     """
     samples, count = sum(t.time.size for t in experiments), OTHERS + 2 * harmonics
     if harmonics and samples < 3 * count:
@@ -252,7 +252,7 @@ def refuse_harmonics(experiments: Sequence[Experiment], harmonics: int, *, simul
 
 
 def correlation_lags(residual: Array) -> int:
-    """Samples over which a residual is correlated: four times its integral time, at most a fifth of it."""
+    """Return the samples over which a residual is correlated: four times its integral time, at most a fifth of it."""
     n = residual.size
     r = residual - residual.mean()
     spectrum = np.fft.rfft(r, 2 * n)
@@ -270,7 +270,7 @@ def correlation_lags(residual: Array) -> int:
 
 
 def uniform(experiment: Experiment) -> tuple[Array, Array, Array, float]:
-    """Times, positions and drive signal on a regular grid, and its rate in Hz; unchanged where regular already."""
+    """Return times, positions and drive signal on a regular grid, and its rate in Hz; unchanged if already regular."""
     period = experiment.period
     signal = experiment.signal()
     if evenly_spaced(experiment.time):
@@ -291,7 +291,7 @@ def uniform(experiment: Experiment) -> tuple[Array, Array, Array, float]:
 
 
 def white_noise(q: Array, rate: float) -> float:
-    """Spectral density of the position's white part, rad²/Hz: the median over the upper 40 % of its spectrum."""
+    """Return the spectral density of the position's white noise, rad²/Hz: median of the upper 40 % of its spectrum."""
     length = int(min(q.size - 2, 1024))
     f, power = spectrum(np.diff(q, 2), rate, length)
     high = (f > 0.3 * rate) & (f < 0.49 * rate)
@@ -300,13 +300,13 @@ def white_noise(q: Array, rate: float) -> float:
 
 
 def least_cutoff(experiment: Experiment) -> float:
-    """Corner below which the filters take more than `MOST_ENDS` of a record, as far as its rate allows, Hz."""
+    """Return the corner below which the filters use more than `MOST_ENDS` of a record, limited by its rate, Hz."""
     seconds = float(experiment.time[-1] - experiment.time[0])
     return min(2.0 * TAPER / (MOST_ENDS * seconds), HIGHEST_PER_RATE / experiment.period)
 
 
 def suitable_cutoff(experiment: Experiment) -> float:
-    """Corner of the low-pass at which noise makes up `NOISE_SHARE` of the acceleration's power, within limits, Hz."""
+    """Return the corner at which noise makes up `NOISE_SHARE` of the acceleration's power, within limits, Hz."""
     _, q, _, rate = uniform(experiment)
     highest = min(HIGHEST_CUTOFF, CUTOFF_PER_RATE * rate)
     density = white_noise(q, rate)
@@ -314,7 +314,7 @@ def suitable_cutoff(experiment: Experiment) -> float:
     for _ in range(40):
         filtered = low_pass(q, corner, rate)
         power = float(np.var(np.gradient(np.gradient(filtered, 1.0 / rate), 1.0 / rate)))
-        # Of the noise, the filters pass about the band below the corner.
+        # The filters pass about the band below the corner of the noise.
         noise = density * (2.0 * math.pi) ** 4 * corner**5 / 5.0
         if noise <= NOISE_SHARE * power:
             break

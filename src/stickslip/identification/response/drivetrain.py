@@ -1,8 +1,8 @@
-"""The response that a position loop closes over, and its modes.
+"""The response within a position loop, and its modes.
 
-The response is the sampled one, from the torque command of a sample to the position that answers to it: hold, delay,
-amplifier and every mode are in it, whatever they are. It is estimated with the excitation as instrument,
-P = S_ry / S_ru, which the loop that was closed meanwhile does not bias (Ljung 1999, 13.5).
+The response is the sampled one, from the torque command of a sample to the resulting position: it includes hold, delay,
+amplifier and every mode. It is estimated with the excitation as instrument, P = S_ry / S_ru, which the closed loop does
+not bias (Ljung 1999, 13.5).
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ Rows = np.ndarray[Any, np.dtype[np.intp]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 
 LOWEST = 5.0
-"""Hz; windows of a response are four periods of it long."""
+"""Lowest frequency, Hz; windows of a response are four of its periods long."""
 HIGHEST = 0.45
-"""Part of the sample rate up to which a response is taken."""
+"""Highest frequency of a response, part of the sample rate."""
 COHERENT = 0.5
 MOST_DELAY = 20.0
-"""Samples that a torque may be late, and be found to be."""
+"""Greatest delay of the torque that is searched, samples."""
 PEAK = 2.0
-"""Factor over the rigid axis's acceleration that makes a mode."""
+"""Factor over the rigid axis's acceleration from which on there is a mode."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +45,13 @@ class LoopResponse:
     ----------
     name : str
     frequency : array, shape (n,)
-        Hz, those at which the excitation is seen (`COHERENT`).
+        Hz, frequencies at which the excitation is detected (`COHERENT`).
     response : array of complex, shape (n,)
         rad/(N·m).
     coherence : array, shape (n,)
-        Of the position with the excitation.
+        Coherence of the position with the excitation.
     sample_time : float
-        s
+        Sample period, s.
     """
 
     name: str
@@ -62,7 +62,7 @@ class LoopResponse:
 
     @property
     def gaps(self) -> tuple[tuple[float, float], ...]:
-        """Between the lowest and the highest, the frequencies that are seen with none seen between them, Hz."""
+        """Gaps without detected frequencies between the lowest and the highest, Hz."""
         step = np.diff(self.frequency)
         wide = np.flatnonzero(step > 1.5 * np.min(step))
         return tuple((float(self.frequency[i]), float(self.frequency[i + 1])) for i in wide)
@@ -74,7 +74,7 @@ class LoopResponse:
 
 
 def loop_response(record: Record, name: str = "") -> LoopResponse:
-    """The response of one record that `stickslip rig run resonance` made.
+    """Estimate the response from a record of `stickslip rig run resonance`.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def loop_response(record: Record, name: str = "") -> LoopResponse:
     Raises
     ------
     InputError
-        If the record is too short or nothing answers to the excitation.
+        If the record is too short, or the position does not respond to the excitation.
     """
     dt = float(np.median(np.diff(record.time)))
     length = math.ceil(4.0 / (LOWEST * dt))
@@ -110,16 +110,16 @@ def loop_response(record: Record, name: str = "") -> LoopResponse:
 
 @dataclass(frozen=True)
 class FittedDrivetrain:
-    """Two inertias with a spring between, as both responses show them.
+    """Two inertias with a spring between them, from both responses.
 
     Attributes
     ----------
     axis : TwoMassAxis or None
-        The encoder on the motor; None: no mode is seen while it slides.
+        The encoder is on the motor; None if there is no mode in sliding.
     delay : float
-        Of the torque beyond hold and the answer one sample later, samples.
+        Delay of the torque in addition to hold and the response one sample later, samples.
     sliding, sticking : float
-        Frequencies of the modes, Hz; that while sliding is not a number for a rigid axis.
+        Frequencies of the modes, Hz; that in sliding is NaN for a rigid axis.
     spread : tuple of float
         Standard deviations of the logarithms of load over motor, of the sticking mode, of the damping; and of the
         delay. Empty for a rigid axis.
@@ -133,21 +133,21 @@ class FittedDrivetrain:
 
 
 def fit_drivetrain(sliding: LoopResponse, sticking: LoopResponse, inertia: float) -> FittedDrivetrain:
-    """Motor side, load side, spring, damping and delay from both responses, by least squares on their logarithms.
+    """Fit motor side, load side, spring, damping and delay to the logarithms of both responses by least squares.
 
-    Sticking, the load side stands still: its mode is the motor side's on the spring. What is beside one mode (an
-    encoder's) is an outlier here and is weighed down.
+    In sticking the load side stands still: its mode is that of the motor side on the spring. Further modes (an
+    encoder's) are outliers here and are weighted down.
 
     Parameters
     ----------
     sliding, sticking : LoopResponse
     inertia : float
-        Of the whole axis, kg·m².
+        Inertia of the whole axis, kg·m².
 
     Raises
     ------
     InputError
-        If the sticking mode does not lie below the sliding one, as it must.
+        If the sticking mode is not below the sliding one, as it must be.
     """
     free, held = sliding.peak, sticking.peak
     if over_rigid(sliding, inertia) < PEAK:
@@ -190,12 +190,12 @@ def fit_drivetrain(sliding: LoopResponse, sticking: LoopResponse, inertia: float
 
 
 def over_rigid(r: LoopResponse, inertia: float) -> float:
-    """Greatest acceleration per torque over that of a rigid axis."""
+    """Return the greatest acceleration per torque over that of a rigid axis."""
     return float(np.max(np.abs(r.response) * inertia * (2.0 * math.pi * r.frequency) ** 2))
 
 
 def rigid_delay(r: LoopResponse, inertia: float) -> float:
-    """Delay of a rigid axis's torque, samples, from the phase that the hold leaves."""
+    """Return the delay of a rigid axis's torque, samples, from the phase without the hold."""
     turn = turn_of(r)
     hold = (1.0 - np.exp(-1j * turn)) / (1j * turn)
     rest: Complex = -r.response * inertia * (2.0 * math.pi * r.frequency) ** 2 / hold
@@ -203,14 +203,14 @@ def rigid_delay(r: LoopResponse, inertia: float) -> float:
 
 
 def turn_of(r: LoopResponse) -> Array:
-    """What a sample is of each frequency, rad."""
+    """Return the phase of one sample at each frequency, rad."""
     return 2.0 * math.pi * r.frequency * r.sample_time
 
 
 def delay_told(ahead: Array, turn: Array) -> float:
-    """The delay, samples, that leaves least of a phase by which a response is ahead of a model without it.
+    """Return the delay, samples, that best explains the phase lead of a response over a model without it.
 
-    A phase says nothing of whole turns, which a bus's delay of some samples makes: tried are delays first.
+    A phase does not determine whole turns, and a bus's delay may be several samples: a grid of delays is tried first.
     """
     tried = np.arange(-1.0, MOST_DELAY, 0.05)
     off = (1.0 - np.cos(ahead + np.multiply.outer(tried, turn))).sum(axis=1)
@@ -220,12 +220,12 @@ def delay_told(ahead: Array, turn: Array) -> float:
 
 
 def near(r: LoopResponse, peak: float) -> Rows:
-    """Rows of a response that its mode governs."""
+    """Return the rows of a response in which its mode dominates."""
     return np.flatnonzero((r.frequency > 0.3 * peak) & (r.frequency < 1.3 * peak))
 
 
 def modelled(x: Array, r: LoopResponse, inertia: float, stuck: bool) -> Complex:
-    """Response of the two inertias; `x`: log of load over motor... share, log of the held mode, log damping, delay."""
+    """Return the response of two inertias; `x`: logs of load over motor, of the held mode, of the damping; delay."""
     share, held, damping = np.exp(x[:3])
     motor = inertia / (1.0 + share)
     load = inertia - motor
@@ -244,7 +244,7 @@ def modelled(x: Array, r: LoopResponse, inertia: float, stuck: bool) -> Complex:
 def identified_drivetrain(
     responses: Sequence[LoopResponse], drivetrain: FittedDrivetrain, said: str
 ) -> Identification:
-    """Modes and delay as an identification without a law; `said` is what is known of the PD that it bears."""
+    """Return modes and delay as an identification without a law; `said` describes the PD that it tolerates."""
     estimates = [
         plain("mode_sticking", "Hz", "f_0", drivetrain.sticking),
         plain("delay", "samples", "d", drivetrain.delay),
@@ -252,7 +252,7 @@ def identified_drivetrain(
     if drivetrain.axis:
         share, mode, damping, delay = drivetrain.spread
         motor, load = drivetrain.axis.inertias
-        # What a relative change of load over motor does to load, to motor, and so to spring and free mode.
+        # Effect of a relative change of load over motor on load and motor, and so on spring and free mode.
         of_load, of_motor = share * motor / drivetrain.axis.inertia, share * load / drivetrain.axis.inertia
         estimates = [
             within("mode_sticking", "Hz", "f_0", drivetrain.sticking, mode * drivetrain.sticking),
@@ -277,20 +277,20 @@ def identified_drivetrain(
 
 
 def plain(name: str, unit: str, symbol: str, value: float) -> Estimate:
-    """A number that was read off a response."""
+    """Return a number read off a response, without an interval."""
     why = "read off the response, without an interval"
     return Estimate(name, unit, symbol, value, math.nan, math.nan, math.nan, False, why)
 
 
 def within(name: str, unit: str, symbol: str, value: float, std: float) -> Estimate:
-    """A number with its interval."""
+    """Return a number with its interval."""
     low, high = value - 1.96 * std, value + 1.96 * std
     why = "" if low > 0.0 and high <= 2.0 * low else "its interval is too wide"
     return Estimate(name, unit, symbol, value, std, low, high, not why, why)
 
 
 def picture_of(responses: Sequence[LoopResponse], drivetrain: FittedDrivetrain) -> Picture:
-    """Acceleration per torque over the frequency, measured and fitted."""
+    """Draw the acceleration per torque over the frequency, measured and fitted."""
     traces: list[Trace] = []
     for r, kind in zip(responses, ("points", "open points"), strict=True):
         f = r.frequency
@@ -310,7 +310,7 @@ def picture_of(responses: Sequence[LoopResponse], drivetrain: FittedDrivetrain) 
 
 
 def coordinates(axis: TwoMassAxis, drivetrain: FittedDrivetrain) -> Array:
-    """A drivetrain as `modelled` takes it."""
+    """Return a drivetrain in the coordinates of `modelled`."""
     return np.array([
         math.log(axis.load / axis.motor), math.log(drivetrain.sticking), math.log(axis.damping),
         drivetrain.delay,

@@ -1,11 +1,11 @@
 """Inertia from the frequency response of the open loop (thesis 4.2).
 
-The axis is taken as inertia with effective viscous friction, V(s)/T(s) = 1 / (J s + b). Responses are averaged over
+The axis is modelled as inertia with effective viscous friction, V(s)/T(s) = 1 / (J s + b). Responses are averaged over
 Hann windows: H1 = S_xy / S_xx (noise on the position), H2 = S_yy / S_yx (noise on the torque), coherence their ratio
 (Bendat and Piersol 2010). The impedance j omega / (motion per torque) = b + j omega J is linear in both unknowns; it is
-fitted on a stated band, weighted by the coherence. Where friction matters the response depends on the amplitude, so
-records of several amplitudes are compared: b falls as the amplitude grows, J stays. The torque is taken as held from
-sample to sample; without that, half a sample of delay would add b dt/2 to the inertia.
+fitted on a stated band, weighted by the coherence. If friction matters, the response depends on the amplitude, so
+records of several amplitudes are compared: b decreases with the amplitude, J is constant. The torque is assumed
+constant from sample to sample; without that, half a sample of delay would add b dt/2 to the inertia.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ Complex = np.ndarray[Any, np.dtype[np.complex128]]
 BAND = (0.4, 25.0)  # Hz, of the fit in the thesis
 COHERENT = 0.5
 NEAR = 1.15
-"""Peaks of several records within this factor are one mode."""
+"""Ratio within which peaks of several records are one mode."""
 PEAK = 1.4
-"""Factor over the rigid axis's response, and over the valleys beside it, that makes a resonance."""
+"""Factor of a resonance over the rigid axis's response and over the adjacent valleys."""
 APART = 3.0
-"""dB between the responses to two torques, a factor of 1.4, from which on the axis is not linear."""
+"""Difference between the responses to two torques above which the axis is not linear, dB: a factor of 1.4."""
 CHANCE = 0.01
-"""That some frequency of a record counts as coherent where nothing is."""
+"""Probability that some frequency of a record counts as coherent by chance."""
 MODE_BAND, FEWEST = 6.0, 16.0
-"""Windows of the search for resonances: four periods of the band's end over this; at least so many in a record."""
+"""Windows of the search for resonances: four periods of the band's end divided by this; fewest in a record."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Response:
         rad/(N·m).
     coherence : array, shape (n,)
     windows : int
-        How many windows do not overlap: what the averages rest on.
+        Number of windows without overlap, on which the averages are based.
     """
 
     name: str
@@ -69,7 +69,7 @@ class Response:
 
 
 def frequency_response(experiment: Experiment, axis: ServoAxis, *, lowest: float = BAND[0]) -> Response:
-    """Position over torque of one record; windows are 4 periods of the lowest frequency long.
+    """Estimate position over torque of one record, with windows of 4 periods of the lowest frequency.
 
     Raises
     ------
@@ -91,13 +91,13 @@ def frequency_response(experiment: Experiment, axis: ServoAxis, *, lowest: float
     if not np.std(torque) > 0.0:
         raise InputError(f"{experiment.name}: the torque never changes; excite the axis")
     insist_on_motion([experiment])
-    # The position wanders; its difference does not, and leaks less. Central, so that it keeps its phase.
+    # The position drifts; its difference does not, and leaks less. Central, to keep its phase.
     speed = np.gradient(q, 1.0 / rate)
     f, sxx = spectrum(torque, rate, length)
     _, syy = spectrum(speed, rate, length)
     sxy = cross_spectrum(torque, speed, rate, length)
     keep = (f > 0.0) & (f < 0.4 * rate)
-    # What the central difference does to s: sin(omega dt) / dt in place of omega.
+    # The central difference replaces s: sin(omega dt) / dt instead of omega.
     s = 1j * np.sin(2.0 * math.pi * f[keep] / rate) * rate
     turn = 1j * 2.0 * math.pi * f[keep] / rate
     held = (1.0 - np.exp(-turn)) / turn
@@ -117,7 +117,7 @@ def inertia(
     band: tuple[float, float] = BAND,
     estimator: str = "h1",
 ) -> Identification:
-    """Inertia and effective viscous friction from open-loop records of one or several amplitudes.
+    """Identify inertia and effective viscous friction from open-loop records of one or several amplitudes.
 
     Parameters
     ----------
@@ -125,13 +125,13 @@ def inertia(
         With the torque that excited them (random, or a sweep).
     axis : ServoAxis
     band : (float, float)
-        Where the rigid axis is fitted, Hz.
+        Band in which the rigid axis is fitted, Hz.
     estimator : {"h1", "h2"}
 
     Returns
     -------
     Identification
-        ``inertia``, and ``viscous[i]`` per record. ``details`` holds ``responses`` and ``resonances`` (Hz).
+        ``inertia``, and ``viscous[i]`` per record. ``details`` contains ``responses`` and ``resonances`` (Hz).
 
     Raises
     ------
@@ -207,17 +207,17 @@ def _result(
 
 
 def verdict_on(low: float, high: float) -> str:
-    """Why a value that must be above 0 is not identified."""
+    """Return the reason why a positive value is not identified."""
     if high < 0.0:
         return "it lies below 0, which no axis has: torque and motion are not of one time, or one has the wrong sign"
     return "cannot be distinguished from 0" if low <= 0.0 else "its interval is too wide"
 
 
 def modes_of(experiments: Sequence[Experiment], axis: ServoAxis, inertia: float, above: float) -> list[float]:
-    """Frequencies at which a record's response has a resonance, Hz; those of several records that are alike are one."""
+    """Return the resonances of the records' responses, Hz; similar ones of several records are one."""
     found: list[float] = []
     for experiment in experiments:
-        # Shorter windows than the fit's: many averages, which tell a mode from chance.
+        # Shorter windows than the fit's: many averages, which distinguish a mode from chance.
         span = float(experiment.time[-1] - experiment.time[0])
         try:
             response = frequency_response(
@@ -230,16 +230,16 @@ def modes_of(experiments: Sequence[Experiment], axis: ServoAxis, inertia: float,
 
 
 def resonances_of(response: Response, inertia: float, above: float) -> list[float]:
-    """Frequencies above the band where the response surely peaks over the rigid axis's, Hz.
+    """Return the frequencies above the band at which the response certainly peaks over the rigid axis's, Hz.
 
-    A peak counts where the coherence is more than chance gives at any of the frequencies, and where it rises out of
-    the lowest response to either side, before a higher peak, by more than the uncertainty of both: their standard
-    deviations are those of a response with that coherence (Bendat and Piersol 2010, eq. 9.90), times the range that
-    the logarithms of so many responses have by chance.
+    A peak counts if the coherence exceeds chance at all frequencies, and if the peak rises above the lowest response to
+    either side, before a higher peak, by more than the uncertainty of both: their standard deviations are those of a
+    response with that coherence (Bendat and Piersol 2010, eq. 9.90), times the range of the logarithms of as many
+    responses by chance.
     """
     place = np.flatnonzero(response.frequency > above)
     n, windows = place.size, response.windows
-    # Of an inertia below 0, which the verdict tells, there is no rigid axis to rise over.
+    # For an inertia below 0, which the verdict reports, there is no rigid axis to compare to.
     if n < 3 or windows < 2 or not inertia > 0.0:
         return []
     f, g = response.frequency[place], response.coherence[place]
@@ -259,7 +259,7 @@ def resonances_of(response: Response, inertia: float, above: float) -> list[floa
 
 
 def merged(found: Sequence[float]) -> list[float]:
-    """Peaks of several records that are one resonance as their mean, ascending, Hz."""
+    """Return the mean of peaks of several records that are one resonance, ascending, Hz."""
     groups: list[list[float]] = []
     for f in sorted(found):
         if groups and f < NEAR * groups[-1][0]:
@@ -270,7 +270,7 @@ def merged(found: Sequence[float]) -> list[float]:
 
 
 def rise(level: Array, spread: Array, factor: float) -> float:
-    """By how much the first level surely stands above the lowest that comes before a higher one."""
+    """Return how far the first level is certainly above the lowest level before a higher one."""
     higher = np.flatnonzero(level > level[0])
     end = int(higher[0]) if higher.size else level.size
     if end < 2:
@@ -300,10 +300,10 @@ def _picture(
 
 
 def _compared(responses: Sequence[Response], band: tuple[float, float]) -> str:
-    """Say whether the responses to the least and the greatest torque differ where the band starts (thesis 4.2)."""
+    """Report whether the responses to the least and the greatest torque differ at the band start (thesis 4.2)."""
     least, most = (pick(responses, key=lambda r: r.amplitude) for pick in (min, max))
     slow, fast = (_gap(least, most, *span) for span in ((band[0], 2.0 * band[0]), (band[1], math.inf)))
-    if not slow >= APART:  # True as well where nothing can be compared.
+    if not slow >= APART:  # True as well if nothing can be compared.
         return "The rigid axis explains the response below its resonances"
     above = f" and by {fast:.2g} dB above {band[1]:g} Hz" if math.isfinite(fast) else ""
     return f"The responses differ by {slow:.2g} dB from {band[0]:g} to {2.0 * band[0]:g} Hz{above}: friction acts"

@@ -1,11 +1,11 @@
-"""How fast a PD a measured response bears: Nyquist's criterion on the frequencies that were seen.
+"""The fastest PD that a measured response tolerates: Nyquist's criterion on the measured frequencies.
 
-The axis itself is stable, but for the two poles of its free motion. The loop is then stable if the locus of its sampled
-response, from low to high frequencies, crosses the real axis left of -1 as often downwards as upwards. Three things
-are not seen and are assumed: below the lowest frequency the axis is an inertia or a spring, beyond the highest the loop
-is weaker than 1, and no mode is damped less than `LIGHT` (ratio). A gap between the frequencies seen is passed over
-only where such a mode inside it would leave the loop weaker than 1 (`weak`): what happens in any other gap is not
-known (`Count.unseen`). A single line that is missing is no gap (`NARROW`).
+The axis itself is stable, except for the two poles of its free motion. The loop is then stable if the locus of its
+sampled response, from low to high frequencies, crosses the real axis left of -1 as often downwards as upwards. Three
+unmeasured properties are assumed: below the lowest frequency the axis is an inertia or a spring, above the highest the
+loop gain is below 1, and no mode is damped less than `LIGHT` (ratio). A gap between the measured frequencies is
+acceptable only if such a mode inside it would keep the loop gain below 1 (`weak`): other gaps leave stability unknown
+(`Count.unseen`). A single missing line is not a gap (`NARROW`).
 """
 
 from __future__ import annotations
@@ -24,25 +24,26 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 
 WEAK, LIGHT = 0.5, 0.02
-"""Loop gain at the ends of a gap that is passed over, at most; and the least damping of a mode that may lie in it."""
+"""Greatest loop gain at the ends of an acceptable gap; least damping of a mode that may be inside it."""
 
 NARROW = 2.5
-"""Lines apart, up to which neighbours see what is between: a Hann window takes in one line more on either side."""
+"""Greatest distance of neighbours, lines, that cover the lines between: a Hann window includes one line on either
+side."""
 
 
 @dataclass(frozen=True)
 class Count:
-    """Encirclements of -1 as far as they were seen.
+    """Encirclements of -1 in the measured frequencies.
 
     Attributes
     ----------
     turns : int
-        Clockwise, over positive frequencies; half the unstable poles of the closed loop. One alone on the negative real
-        axis is not among them: it oscillates at half the sample rate, above every frequency of a response.
+        Clockwise, over positive frequencies; half the unstable poles of the closed loop. A single pole on the negative
+        real axis is not included: it oscillates at half the sample rate, above every frequency of a response.
     frequency : float
-        Of the crossing that encircles, Hz; not a number where none does.
+        Frequency of the crossing that encircles, Hz; NaN if there is none.
     unseen : tuple of float
-        Ends of the first gap at which the loop is not `weak`, Hz; empty where there is none.
+        Ends of the first gap at which the loop is not `weak`, Hz; empty if there is none.
     """
 
     turns: int
@@ -51,23 +52,23 @@ class Count:
 
     @property
     def calm(self) -> bool:
-        """Whether the loop is seen to be stable: no encirclement, and no gap in which a mode may make one."""
+        """Whether the loop is stable: no encirclement, and no gap in which a mode may cause one."""
         return self.turns == 0 and not self.unseen
 
 
 def pd_response(inertia: float, bandwidth: float, damping: float, f: Array, dt: float) -> Complex:
-    """A PD as it is sampled: kp + kd (1 - z^-1) / dt; thesis eq. 3.10."""
+    """Return the response of a sampled PD: kp + kd (1 - z^-1) / dt; thesis eq. 3.10."""
     w = 2.0 * math.pi * bandwidth
     difference = (1.0 - np.exp(-2j * math.pi * f * dt)) / dt
     return (inertia * w * w + 2.0 * inertia * damping * w * difference).astype(np.complex128)
 
 
 def encirclements(found: LoopResponse, inertia: float, bandwidth: float, damping: float = 1.0) -> Count:
-    """How the loop under a PD of that bandwidth (Hz) goes around -1."""
+    """Count the encirclements of -1 by the loop with a PD of that bandwidth (Hz)."""
     f = found.frequency
     locus = pd_response(inertia, bandwidth, damping, f, found.sample_time) * found.response
-    # An inertia under a PD comes from below the real axis, a spring from its right: the lowest frequency seen may
-    # already lie above it.
+    # The locus of an inertia with a PD comes from below the real axis, that of a spring from the right: the lowest
+    # measured frequency may already be above it.
     below = np.concatenate([[True], locus.imag < 0.0])
     before = np.concatenate([[locus[0].real - 1j], locus])
     size = np.abs(locus)
@@ -91,27 +92,27 @@ def encirclements(found: LoopResponse, inertia: float, bandwidth: float, damping
 
 
 def weak(low: float, high: float) -> float:
-    """Loop gain at the ends of a gap (Hz), below which a mode inside it would stay below 1.
+    """Return the loop gain at the ends of a gap (Hz) below which a mode inside it would stay below 1.
 
-    A mode at f0 is c / (f0² - f²) beside its peak and c / (2 LIGHT f0²) on it: it rises most from two ends alike.
+    A mode at f0 is c / (f0² - f²) off its peak and c / (2 LIGHT f0²) on it: it rises most from two equal ends.
     """
     return min(WEAK, 2.0 * LIGHT * (high**2 + low**2) / (high**2 - low**2))
 
 
 @dataclass(frozen=True)
 class Fastest:
-    """How fast a PD may be.
+    """The fastest PD in a set of responses.
 
     Attributes
     ----------
     bandwidth : float
-        From which on it rings, or is not seen to be calm, Hz; the highest tried where neither happens.
+        Bandwidth from which on it oscillates, or is not certainly stable, Hz; the highest tried if neither happens.
     frequency : float
-        At which it rings, Hz; not a number where it does not, or is not seen to.
+        Frequency at which it oscillates, Hz; NaN if it does not, or that is unknown.
     name : str
-        Of the response in which it does; empty where in none.
+        Name of the response in which it does; empty if none.
     unseen : tuple of float
-        Ends of the gap that hides whether it rings, Hz; empty where it is seen.
+        Ends of the gap that hides whether it oscillates, Hz; empty without one.
     """
 
     bandwidth: float
@@ -121,7 +122,7 @@ class Fastest:
 
     @property
     def sentence(self) -> str:
-        """What people read, without a full stop."""
+        """The result as a sentence without a full stop."""
         if not self.name:
             return f"No PD up to {self.bandwidth:.3g} Hz oscillates"
         if self.unseen:
@@ -136,18 +137,18 @@ class Fastest:
 
 
 def fastest_pd(responses: Sequence[LoopResponse], inertia: float) -> Fastest:
-    """The bandwidth from which on a PD rings in some response, or is not seen to be calm.
+    """Find the bandwidth from which on a PD oscillates in some response, or is not certainly stable.
 
     Parameters
     ----------
     responses : sequence of LoopResponse
     inertia : float
-        That places the PD, kg·m², critically damped.
+        Inertia that sets the critically damped PD, kg·m².
 
     Raises
     ------
     InputError
-        If that holds for every bandwidth tried.
+        If that is the case for every bandwidth tried.
     """
     tried = np.geomspace(0.5, 0.1 / responses[0].sample_time, 400)
     for place, bandwidth in enumerate(tried):

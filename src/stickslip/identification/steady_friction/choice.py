@@ -1,4 +1,4 @@
-"""Which sliding curve: the classical combinations and thesis eqs. 2.6, 4.4 and 4.5, chosen by points left out."""
+"""Choice of the sliding curve: the classical combinations and thesis eqs. 2.6, 4.4 and 4.5, by points left out."""
 
 from __future__ import annotations
 
@@ -28,35 +28,34 @@ from stickslip.models.model import Model
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 COULOMB = "Coulomb with viscous"
-"""The candidate that any contact has at least."""
+"""Name of the candidate that describes any contact at least."""
 FOLD_REACH = 10.0
-"""Factor within which a parameter of a fit to a part of the points stays around that of the fit to all."""
+"""Greatest factor of a parameter between a fit to a part of the points and the fit to all."""
 FOLD_EXPONENT = 2.0
-"""The same of an exponent: ten times that of a power of the velocity leaves every scale at the next faster point."""
+"""Greatest factor of an exponent between these: tenfold exponents exceed every scale at the next faster point."""
 SPARE = 2
-"""Points more than parameters that a curve needs to be compared with others."""
+"""Fewest points in excess of the parameters for a curve to be compared with others."""
 ALIKE = 0.01
-"""Difference in AICc below which two laws fit alike."""
+"""Difference in AICc below which two laws fit equally well."""
 
 
 def candidates(velocity: Array, torque: Array, known: Mapping[str, float] | None = None) -> dict[str, Model]:
-    """Laws without a pre-sliding part, on the scales of a sliding curve, from few parameters to many.
+    """Return laws without a pre-sliding part, on the scales of a sliding curve, from few parameters to many.
 
-    All of them act at constant velocity with all their parameters, so that none is left at a guess.
+    All their parameters act at constant velocity, so none stays at a guessed value.
 
     Parameters
     ----------
     velocity, torque : array, shape (n,)
         rad/s and N·m, of either sign; at least one velocity other than 0.
     known : mapping of str to float, optional
-        Values to start from, taken by every curve that has the parameter.
+        Starting values, used by every curve that has the parameter.
 
     Returns
     -------
     dict of str to Model
-        By what the curve is called in the field, with its equation: viscous (2.3), Coulomb with viscous, Stribeck
-        (2.6), and the sums of two exponentials (4.4, the power of the second viscous term free) and of two Stribeck
-        curves (4.5).
+        By the curve's common name with its equation: viscous (2.3), Coulomb with viscous, Stribeck (2.6), and the sums
+        of two exponentials (4.4, the power of the second viscous term free) and of two Stribeck curves (4.5).
     """
     level, fast = float(np.median(np.abs(torque))), float(np.max(np.abs(velocity)))
     stribeck = {"fs": 1.2 * level, "fc": level, "vs": 0.05 * fast}
@@ -97,7 +96,7 @@ def each_direction(model: Model) -> Model:
 
 
 def comparable(points: SlidingPoints, templates: Mapping[str, Model]) -> dict[str, Model]:
-    """Return the candidates; of points too few for Coulomb friction to be compared with others, it alone."""
+    """Return the candidates; only Coulomb friction if the points are too few to compare it with others."""
     count = steady_vector(points, templates[COULOMB], ()).size
     return {COULOMB: templates[COULOMB]} if len(points) < count + SPARE else dict(templates)
 
@@ -111,35 +110,35 @@ def choose_sliding(
     starts: int = 40,
     progress: Callable[[str], None] = silent,
 ) -> tuple[str, Identification, dict[str, dict[str, float]]]:
-    """Fit several curves and choose: the fewest parameters whose error on points left out is not worse.
+    """Fit several curves and choose the one with the fewest parameters whose error on points left out is not worse.
 
     Points at the same speed, in either direction, are left out together. Among the curves within one standard error of
-    the least cross-validated error (Breiman et al. 1984), the one with the least AICc is taken.
+    the least cross-validated error (Breiman et al. 1984), the one with the least AICc is chosen.
 
     Parameters
     ----------
     points, noise, starts
         As for `identify_sliding`.
     templates : mapping of str to Model, optional
-        Laws to choose from; `candidates` where not given.
+        Candidate laws; None for `candidates`.
     frozen : sequence of str
-        Parameters that stay at the template's values, in every template that has them.
+        Parameters that are held at the template's values, in every template that has them.
     progress : callable
-        Is told what begins, in a few words.
+        Called with a short description of each step as it starts.
 
     Returns
     -------
     name : str
-        Of the chosen template.
+        Name of the chosen template.
     result : Identification
-        Its fit; its notes list what was tried, ``details["comparison"]`` is the table of all.
+        Its fit; its notes list the candidates, ``details["comparison"]`` is the table of all.
     table : dict
-        Per template: parameters, rms_Nm, aicc, bic, cross_validated_Nm. Templates with more parameters than points
-        can tell are left out.
+        Per template: parameters, rms_Nm, aicc, bic, cross_validated_Nm. Templates with too many parameters for the
+        points are left out.
     """
     level, whole = default_noise(points, noise), points
     if points.offset is None and points.one_way:
-        # A constant torque would take the place of Coulomb friction, and the law without a level would be chosen.
+        # A constant torque would replace Coulomb friction, and a law without a level would be chosen.
         points = replace(points, offset=0.0)
     laws = candidates(points.velocity, points.torque) if templates is None else templates
     kept = {name: [n for n in frozen if n in t.parameters._fields] for name, t in laws.items()}
@@ -190,8 +189,8 @@ def _choice_notes(chosen: str, table: Mapping[str, Mapping[str, float]], laws: I
 def left_out_error(
     points: SlidingPoints, template: Model, fitted: Indices, left_out: Indices, frozen: Sequence[str] = ()
 ) -> Array:
-    """Weighted errors at some points of the curve fitted to the others."""
-    # Fewer points may leave a parameter open that all of them close: it must not run off and blow the error up.
+    """Return weighted errors at some points of the curve fitted to the others."""
+    # Fewer points may leave a parameter undetermined: it must not diverge and dominate the error.
     limits: dict[str, tuple[float, float]] = {}
     for p in steady_vector(points, template, frozen).free:
         reach = FOLD_EXPONENT if p.par.unit == "-" else FOLD_REACH
@@ -208,6 +207,6 @@ def _best(table: Mapping[str, Mapping[str, float]], n: int, laws: Mapping[str, M
     room = least * (1.0 + 1.0 / math.sqrt(2.0 * n))  # one standard error of a root mean square of n errors
     near = [name for name, row in table.items() if row["cross_validated_Nm"] <= room]
     lowest = min(table[name]["aicc"] for name in near)
-    # Laws that share a curve differ by rounding here: the one with the least beside the curve is taken.
+    # Laws with a common curve differ by rounding here: the one with the fewest other parameters is chosen.
     alike = [name for name in near if table[name]["aicc"] <= lowest + ALIKE]
     return min(alike, key=lambda name: len(laws[name].law.fields))

@@ -1,8 +1,8 @@
-"""The sliding curve: friction at constant velocity, fitted by any law, with a verdict on what is determined.
+"""The sliding curve: friction at constant velocity, fitted by any law, with a verdict on each parameter.
 
 Thesis 3.1.3.1 (eq. 2.6 through the velocities 3.18, figure 3.8), 4.3.1.1.2 (break-away torque included at zero
-velocity) and 4.3.2.1.2 (eqs. 4.4 and 4.5). Between the lowest velocities the Stribeck parameters replace each
-other: without a point on the downward bend many curves fit alike, whatever the residual says.
+velocity) and 4.3.2.1.2 (eqs. 4.4 and 4.5). At the lowest velocities the Stribeck parameters are interchangeable:
+without a point on the falling part, many curves fit equally well, whatever the residual.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ from stickslip.models.model import Model
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BELOW, ABOVE = 0.5, 2.0
-"""Times the lowest and the highest velocity measured: in between one more point is looked for."""
+"""Factors on the lowest and the highest measured velocity, between which one more point is searched."""
 OWN = "spread within each segment"
-"""Source of a noise level that comes from the points themselves."""
+"""Source of a noise level from the points themselves."""
 BEYOND = 10.0
-"""Times the largest torque of the points: bound of the search for a level of friction. A level at rest is extrapolated
-and may exceed every torque at constant velocity; what the points leave open shows in its interval."""
+"""Greatest level of friction in the search, relative to the largest torque of the points. A level at rest is
+extrapolated and may exceed every torque at constant velocity; its interval shows the uncertainty."""
 
 
 def default_noise(points: SlidingPoints, noise: Noise | float | None) -> Noise | None:
-    """The noise given, else that of the repeats or of the points themselves, whichever is greater."""
+    """Return the given noise, else that of the repeats or of the points themselves, whichever is greater."""
     if noise is not None:
         return as_noise(noise)
     repeats = noise_of_repeats(points.repeats())
@@ -56,7 +56,7 @@ def default_noise(points: SlidingPoints, noise: Noise | float | None) -> Noise |
 
 
 def untouched_parameters(template: Model, frozen: Iterable[str], vector: Vector) -> list[str]:
-    """Parameters that nobody froze and that do not act at these velocities, each element's under one name."""
+    """Return the parameters that are not frozen and do not act at these velocities, each element's under one name."""
     free = Vector(template, frozen=frozen).names
     idle = [name.partition("[")[0] for name in free if name not in vector.names]
     return list(dict.fromkeys(idle))
@@ -71,7 +71,7 @@ def fit_sliding(
     ``limits`` are further bounds of the search, by name.
     """
     vector = steady_vector(points, template, frozen)
-    # A table of points is fitted as it stands; of a record's levels the slow ones may be in doubt.
+    # A table of points is fitted without these bounds; the slow levels of a record are less certain.
     bends = bend_limits(vector, np.abs(points.velocity)) if points.absolute else {}
     levels = level_bounds(points, vector)
     vector = vector_of(points, template, free=vector.names, limits={**levels, **bends, **(limits or {})})
@@ -105,7 +105,7 @@ def fit_sliding(
 
 
 def level_bounds(points: SlidingPoints, vector: Vector) -> dict[str, tuple[float, float]]:
-    """Return the bounds of the search for levels of friction, by name, N·m."""
+    """Return the search bounds of the levels of friction, by name, N·m."""
     most = BEYOND * float(np.max(np.abs(points.torque)))
     return {p.name: (0.0, most) for p in vector.free if p.par.unit == "N·m" and p.par.positive}
 
@@ -124,27 +124,27 @@ def identify_sliding(
     Parameters
     ----------
     points : SlidingPoints
-        With the break-away torque at zero velocity where it was measured.
+        With the break-away torque at zero velocity if it was measured.
     template : Model
-        The law with its choices (``curve``); its values are where the search starts. Parameters that do not act at
-        constant velocity stay as they are.
+        The law with its choices (``curve``); its values are the start of the search. Parameters that do not act at
+        constant velocity keep their values.
     noise : Noise or float, optional
         Standard deviation of a point, N·m. Without it, that of repeated velocities.
     frozen : sequence of str
-        Parameters that stay at the template's values.
+        Parameters that are held at the template's values.
     starts : int
-        Random starts of the search.
+        Number of random starts of the search.
     fastest : float
-        Highest velocity that the axis can run, rad/s: no point is asked for above.
+        Highest velocity of the axis, rad/s: no point above it is requested.
 
     Returns
     -------
     Identification
         ``details["family"]``: parameters of equally good curves, shape (m, free parameters);
-        ``details["next_velocity"]``: where one more point would tell them apart best, rad/s (None: all is told);
-        ``details["speeds"]``: the slowest and the fastest speed, rad/s;
-        ``details["untouched"]``: parameters that do not act at these velocities, whose values in `model` are those of
-        the template; ``details["constant_torque"]``: the constant torque, N·m, if there is one.
+        ``details["next_velocity"]``: velocity at which one more point would distinguish them best, rad/s (None if all
+        are determined); ``details["speeds"]``: the slowest and the fastest speed, rad/s; ``details["untouched"]``:
+        parameters that do not act at these velocities, whose values in `model` are those of the template;
+        ``details["constant_torque"]``: the constant torque, N·m, if there is one.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def identify_sliding(
             "measure at more velocities or freeze parameters"
         )
     if len(points) == count and level is not None and level.source == OWN:
-        level = None  # a curve through every point is held against nothing
+        level = None  # The residual of a curve through every point contains no information.
     found = fit_sliding(points, template, level, frozen, starts, profiles=True)
     if "offset" in found.vector.names:
         found = apart_from_friction(found, points)
@@ -185,16 +185,16 @@ def identify_sliding(
 
 
 def span_of(points: SlidingPoints) -> tuple[float, float]:
-    """The slowest and the fastest speed of the points, rad/s."""
+    """Return the slowest and the fastest speed of the points, rad/s."""
     moving = np.abs(points.velocity[points.velocity != 0.0])
     return (float(np.min(moving)), float(np.max(moving))) if moving.size else (math.nan, math.nan)
 
 
 def next_velocity(points: SlidingPoints, found: Fit, fastest: float = math.inf) -> float | None:
-    """The velocity at which one more point would tell most, rad/s: from half the lowest measured to twice the highest.
+    """Return the velocity of the most informative next point, rad/s: half the lowest measured to twice the highest.
 
-    Each of the equally good curves is taken as the truth in turn; a point tells most where the curves that would
-    still agree with it, within the noise, span the least in their parameters. None where no point would tell.
+    Each of the equally good curves is assumed to be true in turn; a point is most informative if the parameters of the
+    curves that still agree with it, within the noise, span the least. None if no point is informative.
     """
     fast = np.abs(points.velocity[points.velocity != 0.0])
     if fast.size == 0:
@@ -222,11 +222,11 @@ def next_velocity(points: SlidingPoints, found: Fit, fastest: float = math.inf) 
     return float(grid.tolist()[best]) if left[best] < 0.9 * max(left) else None
 
 
-# ---- what is said about it -----------------------------------------------------------------------------------
+# ---- notes on it ---------------------------------------------------------------------------------------------
 
 
 def model_of(found: Fit) -> tuple[Model | None, list[str]]:
-    """The law that was found, or why no law holds these values."""
+    """Return the law that was found, or a note on why no law accepts these values."""
     try:
         return found.vector.model(found.u), []
     except ParameterError as error:
@@ -242,7 +242,7 @@ def _noise_notes(found: Fit) -> list[str]:
 
 
 def _open_notes(unknown: Sequence[str], untouched: Sequence[str]) -> list[str]:
-    """Which parameters these points leave open."""
+    """Return notes on the parameters that these points do not determine."""
     notes: list[str] = []
     if untouched:
         notes.append(
@@ -255,7 +255,7 @@ def _open_notes(unknown: Sequence[str], untouched: Sequence[str]) -> list[str]:
 
 
 def _measure_next(points: SlidingPoints, found: Fit, settling: float | None) -> tuple[str, ...]:
-    """What would tell more."""
+    """Return the measurement that would determine more."""
     if settling is not None:
         return (f"Measure the torque at a constant velocity of {settling:.3g} {axis_unit(points.unit[0])}.",)
     return () if found.noise.known else ("Repeat some velocities, so that the noise level is known.",)

@@ -1,4 +1,4 @@
-"""Pictures of a sliding curve: the points with the curves that fit them, and what is left."""
+"""Pictures of a sliding curve: the points with the curves that fit them, and the residuals."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from stickslip.identification.steady_friction.points import SlidingPoints
 from stickslip.identification.steady_friction.torques import Torques
 
 FAMILY = 40
-"""How many of the equally good curves are drawn."""
+"""Number of equally good curves that are drawn."""
 
 
 def law_of(found: Fit) -> Any:
-    """The law that is fitted."""
+    """Return the fitted law."""
     assert found.vector.base is not None
     return found.vector.base.law
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names in a sentence."""
+    """Return names as a list within a sentence."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def curve_picture(points: SlidingPoints, found: Fit, settling: float | None) -> Picture:
-    """The points, the best curve, and curves that fit as well (thesis figures 3.7 to 3.9, 4.33).
+    """Draw the points, the best curve, and curves that fit equally well (thesis figures 3.7 to 3.9, 4.33).
 
-    Negative velocities are carried to the positive side, and the constant torque is taken off; break-away torques are
+    Negative velocities are mirrored to the positive side, and the constant torque is subtracted; break-away torques are
     at the left edge.
     """
     fast = np.abs(points.velocity[points.velocity != 0.0])
@@ -76,7 +76,7 @@ def curve_picture(points: SlidingPoints, found: Fit, settling: float | None) -> 
 
 
 def residual_picture(points: SlidingPoints, found: Fit) -> Picture:
-    """Residuals over velocity."""
+    """Draw the residuals over velocity."""
     rest = found.optimum.residuals / points.weight
     zero = np.array([float(np.min(points.velocity)), float(np.max(points.velocity))])
     traces = (Trace("", zero, 0.0 * zero), Trace("", points.velocity, rest, "points"))

@@ -1,8 +1,8 @@
 """Levels of constant velocity in a motion, from the fastest of a staircase to its slowest.
 
-A velocity is the slope of the position over a window. What an encoder's counts, cogging and noise leave of it is
-small against a fast level over 50 ms, and against a slow one over seconds only: every window is tried, and of levels
-that overlap the longest is kept.
+A velocity is the slope of the position over a window. The errors due to an encoder's counts, cogging and noise are
+small for a fast level over 50 ms, and for a slow one only over seconds: every window is tried, and of overlapping
+levels the longest is kept.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from stickslip.identification.fit.noise import white_std
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 WINDOW, WIDER, WIDEST = 0.05, 3.0, 0.1
-"""s, the first window; by how much the next is wider; part of the record that the last one spans at most."""
+"""First window, s; ratio of each window to the one before; greatest part of the record that a window spans."""
 END = 0.1
-"""Of a level, a window of it at most, that is left out at its end: the axis may brake there already."""
+"""Part of a level, at most one window, that is left out at its end: the axis may already brake there."""
 LEAST_COUNTS = 20.0
-"""Counts of the encoder over which a level must travel: its velocity is then known to a twentieth."""
+"""Least travel of a level, counts of the encoder: its velocity is then known to a twentieth."""
 SWING = 0.3
-"""Of the mean velocity, RMS, by which it may swing about it."""
+"""Greatest RMS fluctuation of the velocity, part of its mean."""
 OVERLAP = 0.1
-"""Part of a level that a longer one may cover."""
+"""Greatest part of a level that a longer one may cover."""
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """Rows (first and last) of about constant velocity, and why it is none to average over; empty where it is."""
+    """Rows (first and last) of nearly constant velocity, and the reason not to average over them, if any."""
 
     first: int
     last: int
@@ -54,7 +54,7 @@ def find_levels(time: Array, position: Array, tolerance: float, shortest: float)
     Returns
     -------
     list of Level
-        Those without a complaint overlap each other by a tenth at most.
+        Those without a reason overlap each other by at most a tenth.
     """
     found: list[tuple[int, int, float]] = []
     span, row = float(time[-1] - time[0]), float(np.median(np.diff(time)))
@@ -63,7 +63,7 @@ def find_levels(time: Array, position: Array, tolerance: float, shortest: float)
         stride = max(1, int((window - WINDOW) / (20.0 * row)))
         rows = np.arange(0, time.size, stride)
         speed = slope_of(time, position, window)[rows]
-        # The window smears the ends of a level over half of it.
+        # The window blurs the ends of a level over half its length.
         margin = 0.5 * (window - WINDOW)
         for a, b in level_runs(time[rows], speed, tolerance):
             begin, end = float(time[rows[a]]), float(time[rows[b]])
@@ -77,7 +77,7 @@ def find_levels(time: Array, position: Array, tolerance: float, shortest: float)
 
 
 def select_longest(time: Array, position: Array, found: list[tuple[int, int, float]]) -> list[Level]:
-    """Return the longest of levels that overlap; those that cannot be averaged have the reason."""
+    """Return the longest of overlapping levels; those that cannot be averaged have the reason."""
     count = encoder_step(position)
     noise = max(count / math.sqrt(12.0), white_std(position))
     fine = slope_of(time, position, WINDOW)
@@ -95,14 +95,14 @@ def select_longest(time: Array, position: Array, found: list[tuple[int, int, flo
 def find_fault(
     time: Array, position: Array, fine: Array, first: int, last: int, window: float, count: float, noise: float
 ) -> str:  # fmt: skip
-    """Why the mean torque of a level is not that of its velocity; empty where it is."""
+    """Return the reason why the mean torque of a level is not that of its velocity; empty if it is."""
     travel = abs(float(position[last] - position[first]))
     if travel < LEAST_COUNTS * count:
         return f"travels {travel / count:.0f} counts of the encoder"
     if window == WINDOW:
         return ""
     velocity = travel / float(time[last] - time[first])
-    # Two positions, each with its noise, make a slope.
+    # A slope has two positions, each with its noise.
     own = 2.0 * (noise / WINDOW) ** 2
     swing = math.sqrt(max(float(np.var(fine[first : last + 1])) - own, 0.0)) / velocity
     return (
@@ -111,7 +111,7 @@ def find_fault(
 
 
 def slope_of(time: Array, position: Array, window: float = WINDOW) -> Array:
-    """Slope of the position over a window (s) around every sample, rad/s."""
+    """Return the slope of the position over a window (s) around every sample, rad/s."""
     before = np.maximum(np.searchsorted(time, time - 0.5 * window), 0)
     after = np.minimum(np.searchsorted(time, time + 0.5 * window, side="right"), time.size) - 1
     before, after = (
@@ -125,7 +125,7 @@ def slope_of(time: Array, position: Array, window: float = WINDOW) -> Array:
 
 
 def level_runs(time: Array, speed: Array, tolerance: float) -> list[tuple[int, int]]:
-    """Longest runs (first, last) in which the velocity stays within the tolerance of their own middle."""
+    """Return the longest runs (first, last) in which the velocity stays within the tolerance of their middle."""
     runs: list[tuple[int, int]] = []
     values = speed.tolist()
     first = 0
@@ -137,15 +137,15 @@ def level_runs(time: Array, speed: Array, tolerance: float) -> list[tuple[int, i
             if higher - lower > tolerance * abs(lower + higher):
                 break
             low, high, last = lower, higher, last + 1
-        if last > first and low + high != 0.0:  # what stands has no tolerance, and is passed over as a whole
+        if last > first and low + high != 0.0:  # a standstill has no tolerance and is skipped as a whole
             runs.append((first, last))
         first = last + 1
-    # A ramp is cut into many short runs; a level one outlasts its neighbours.
+    # A ramp is split into many short runs; a level one outlasts its neighbours.
     return [(a, b) for a, b in runs if abs(_drift(time[a : b + 1], speed[a : b + 1])) <= tolerance]
 
 
 def _drift(time: Array, speed: Array) -> float:
-    """Change of the velocity from the first to the last third of a run, over its mean."""
+    """Return the change of the velocity from the first to the last third of a run, over its mean."""
     third = max(time.size // 3, 1)
     mean = float(np.mean(speed))
     return float(np.mean(speed[-third:]) - np.mean(speed[:third])) / mean if mean else math.inf

@@ -1,4 +1,4 @@
-"""The constant torque (weight, offset) of a sliding curve: what the result states about it."""
+"""The constant torque (weight, offset) of a sliding curve: its verdicts and notes."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def with_unknown_offset(found: Fit, tied: Sequence[str], points: SlidingPoints) 
 def apart_from_friction(found: Fit, points: SlidingPoints) -> Fit:
     """Return a fit with the verdict that one direction does not determine the constant torque.
 
-    A law without Coulomb friction takes that friction for a constant torque.
+    A law without Coulomb friction represents that friction as a constant torque.
     """
     if not points.one_way:
         return found

@@ -14,7 +14,7 @@ from stickslip.identification.fit.selection import Indices
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SAME_VELOCITY = 0.005
-"""Velocities within this part of each other are repeats of one."""
+"""Greatest relative difference of velocities that are repeats of one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,15 +24,15 @@ class SlidingPoints:
     Attributes
     ----------
     velocity : array, shape (n,)
-        rad/s; 0 for a break-away torque, whose sign says in which direction.
+        rad/s; 0 for a break-away torque, whose sign gives the direction.
     torque : array, shape (n,)
         Torque that keeps the axis moving, N·m: friction and, with `offset`, a constant torque.
     std : array, shape (n,), optional
-        Standard deviations relative to each other; equal where not given.
+        Standard deviations relative to each other; equal if None.
     absolute : bool
         Whether they are known in N·m; no point then has a smaller standard deviation.
     unit : (str, str)
-        Of velocity and torque.
+        Units of velocity and torque.
     offset : float or None
         Constant torque in `torque` (a weight), N·m; None if it is not known and has to be fitted.
     """
@@ -63,7 +63,7 @@ class SlidingPoints:
         return self.velocity.size
 
     def __add__(self, other: SlidingPoints) -> SlidingPoints:
-        """These points and others."""
+        """Return these points and others."""
         both = [replace(p, std=np.ones(len(p))) if p.std is None else p for p in (self, other)]
         std = (
             None
@@ -76,12 +76,12 @@ class SlidingPoints:
         )  # fmt: skip
 
     def only(self, rows: Any) -> SlidingPoints:
-        """Some of the points."""
+        """Return some of the points."""
         return replace(self, velocity=self.velocity[rows], torque=self.torque[rows],
                        std=None if self.std is None else self.std[rows])  # fmt: skip
 
     def folded(self) -> SlidingPoints:
-        """Negative velocities carried to the positive side, as the thesis averages both directions (4.3.2.1.2)."""
+        """Return the points with negative velocities mirrored, as the thesis averages both directions (4.3.2.1.2)."""
         side = self.side
         return replace(self, velocity=np.abs(self.velocity), torque=side * self.torque)
 
@@ -97,13 +97,13 @@ class SlidingPoints:
 
     @property
     def weight(self) -> Array:
-        """What every residual is multiplied by; 1 in the mean square."""
+        """Factor on every residual; 1 in the mean square."""
         if self.std is None:
             return np.ones(len(self))
         return 1.0 / (self.std * math.sqrt(float(np.mean(self.std**-2.0))))
 
     def repeats(self) -> list[Array]:
-        """Weighted torques at velocities that occur more than once."""
+        """Return the weighted torques at velocities that occur more than once."""
         order = np.lexsort((self.side, self.velocity))
         v, side, t = self.velocity[order], self.side[order], (self.torque * self.weight)[order]
         new = (np.diff(v) > SAME_VELOCITY * np.abs(v[1:])) | (side[1:] != side[:-1])
@@ -111,7 +111,7 @@ class SlidingPoints:
         return [g for g in np.split(t, cuts) if g.size > 1]
 
     def speeds(self) -> Indices:
-        """A label for every point: repeats of a speed, in either direction, share one; break-away torques do not."""
+        """Return a label for every point: repeats of a speed share one in either direction; break-aways do not."""
         speed = np.abs(self.velocity)
         order = np.argsort(speed, kind="stable")
         new = np.diff(speed[order]) > SAME_VELOCITY * speed[order][1:]

@@ -1,8 +1,8 @@
-"""What depends on the angle: friction's ripple, and the torque that acts beside friction (cogging, an offset).
+"""Dependence on the angle: friction's ripple, and the torque besides friction (cogging, an offset).
 
-At a constant speed the motor gives T+(theta) one way and T-(theta) the other. Half their difference is friction, half
-their sum is what does not change its sign with the velocity. Both repeat every revolution (thesis 2.1.6, 4.3.1.1.2):
-each run is fitted by harmonics, and those are kept that agree over the speeds.
+At a constant speed the motor's torque is T+(theta) in one direction and T-(theta) in the other. Half their difference
+is friction; half their sum does not change sign with the velocity. Both repeat every revolution (thesis 2.1.6,
+4.3.1.1.2): each run is fitted by harmonics, and those that agree over the speeds are kept.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from stickslip.machines.motor import Harmonics
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 HIGHEST = 30
-"""Greatest order looked for."""
+"""Greatest order searched."""
 FASTEST = 1.0
-"""rad/s, beyond which the loop and the axis's inertia distort what the motor's torque shows."""
+"""Fastest run that is used, rad/s: above it the loop and the axis's inertia distort the motor's torque."""
 LEAST = 0.003
-"""Of the mean friction, below which a harmonic is not worth its name."""
+"""Least amplitude of a harmonic, part of the mean friction."""
 SURE = 3.0
 """Standard errors over the speeds by which a harmonic must exceed zero."""
 CIRCLE = np.linspace(0.0, 2.0 * math.pi, 361)
@@ -37,20 +37,20 @@ def identify_angle(
     record: Record, segments: Sequence[Segment] = (), *, torque: str = "motor_torque", fastest: float = FASTEST,
     highest: int = HIGHEST,
 ) -> Identification:  # fmt: skip
-    """Ripple and the torque beside friction, from runs at constant velocities in both directions.
+    """Identify the ripple and the torque besides friction from runs at constant velocities in both directions.
 
     Parameters
     ----------
     record : Record
         Channels ``position`` (absolute, rad), the torque's, and ``velocity_reference`` if known.
     segments : sequence of Segment
-        Which segments to take; those of `constant_velocity_segments` where empty.
+        Segments to use; those of `constant_velocity_segments` if empty.
     torque : str
-        Channel.
+        Channel of the torque.
     fastest : float
-        Speeds up to this one are taken, rad/s; the slowest one if all are faster.
+        Fastest speed used, rad/s; the slowest one if all are faster.
     highest : int
-        Greatest order.
+        Greatest order searched.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def identify_angle(
 
 
 def paired(segments: Sequence[Segment]) -> dict[float, tuple[Segment, Segment]]:
-    """Positive and negative run of each speed, from the fastest (the speed to 2 digits)."""
+    """Return the positive and negative run of each speed (to 2 digits), the fastest first."""
     by: dict[float, dict[bool, Segment]] = {}
     for s in segments:
         by.setdefault(float(f"{abs(s.velocity):.2g}"), {})[s.velocity > 0.0] = s
@@ -109,25 +109,25 @@ def _rows(record: Record, s: Segment, torque: str) -> tuple[Array, Array]:
 
 
 def _halves(record: Record, pair: tuple[Segment, Segment], torque: str, highest: int) -> Array:
-    """Coefficients of half the difference and half the sum, shape (2, 1 + 2 highest)."""
+    """Return the coefficients of half the difference and half the sum, shape (2, 1 + 2 highest)."""
     one, other = (_coefficients(*_rows(record, s, torque), highest) for s in pair)
     return np.array([0.5 * (one - other), 0.5 * (one + other)])
 
 
 def _coefficients(angle: Array, torque: Array, highest: int) -> Array:
-    """Mean, then cosine and sine of every order; shape (1 + 2 highest,)."""
+    """Return the mean, then cosine and sine of every order, shape (1 + 2 highest,)."""
     if angle.size < 4 * highest:
         raise InputError(
             f"a revolution of {angle.size} samples does not show order {highest}; record more, or lower `highest`"
         )
     waves = [f(n * angle) for n in range(1, highest + 1) for f in (np.cos, np.sin)]
     matrix = np.column_stack([np.ones_like(angle), *waves])
-    # Over whole revolutions the columns are all but orthogonal: the normal equations lose nothing.
+    # Over whole revolutions the columns are nearly orthogonal, so the normal equations are accurate.
     return np.asarray(np.linalg.solve(matrix.T @ matrix, matrix.T @ torque), dtype=np.float64)
 
 
 def _kept(values: Array, least: float, highest: int) -> Harmonics:
-    """The harmonics, averaged over the runs, that are large enough and agree."""
+    """Return the harmonics, averaged over the runs, that are large enough and agree."""
     mean = values.mean(axis=0)
     error = values.std(axis=0, ddof=1) / math.sqrt(len(values)) if len(values) > 1 else np.zeros_like(mean)
     kept: list[tuple[float, float, float]] = []
@@ -158,7 +158,7 @@ def _estimates(
 
 
 def _misfit(record: Record, segments: Sequence[Segment], torque: str, angle: AngleMap) -> float:
-    """RMS over all runs of what the map leaves of the torque's variation over the revolution, N·m."""
+    """Return the RMS over all runs of the torque's variation over the revolution without the map, N·m."""
     left: list[Array] = []
     for s in segments:
         x, y = _rows(record, s, torque)
@@ -172,7 +172,7 @@ def _misfit(record: Record, segments: Sequence[Segment], torque: str, angle: Ang
 def _picture(
     record: Record, pair: tuple[Segment, Segment], torque: str, angle: AngleMap, level: float
 ) -> Picture:
-    """Torque over the angle at the slowest speed, both directions (thesis figures 4.6, 4.7, 4.29, 4.30)."""
+    """Draw the torque over the angle at the slowest speed, both directions (thesis figures 4.6, 4.7, 4.29, 4.30)."""
     traces: list[Trace] = []
     for s, word, kind in zip(pair, ("positive", "negative"), ("points", "open points"), strict=True):
         x, y = _rows(record, s, torque)

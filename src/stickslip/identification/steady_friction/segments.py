@@ -1,8 +1,8 @@
 """Constant-velocity segments of records, and the friction torque of each: thesis 4.3.1.1.2.
 
-The first 20 degrees of a segment are dropped, or a fifth of it where that is less, and the torque is averaged over
-whole revolutions, so that what depends on the position averages out. Shorter ones keep what it does to them in their
-standard deviation.
+The first 20 degrees of a segment are dropped, or a fifth of it if that is less, and the torque is averaged over whole
+revolutions, which averages out its dependence on the position. For shorter ones that dependence adds to the standard
+deviation.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 REVOLUTION = 2.0 * math.pi
 TRANSIENT, SHARE = math.radians(20.0), 0.2
-"""rad, and part of its travel, of a segment that are dropped at its start: whichever is less."""
+"""Travel dropped at the start of a segment: rad, and part of its travel, whichever is less."""
 BINS = 120
-"""Parts of a segment that count alike."""
+"""Parts of a segment with equal weight."""
 PARTS = 8
-"""Of a segment, whose spread is the doubt of its mean where there are no revolutions to compare."""
+"""Parts of a segment whose spread gives the uncertainty of its mean without whole revolutions."""
 LINEARITY = 1e-4
-"""Of itself, to which a torque is known at best: no sensor and no current is more linear."""
+"""Least relative uncertainty of a torque: no sensor or current is more linear."""
 STANDING = 0.7
-"""Share of the time at rest from which the mean torque is no friction any more."""
+"""Share of the time at rest above which the mean torque is no longer friction."""
 SAME, CREEP = 0.1, 0.05
-"""Of a level's velocity, within which a shorter piece of it is not named; and of the slowest level's, below which what
-was dropped is no level."""
+"""Relative velocity difference within which a shorter piece of a level is not reported; part of the slowest level's
+velocity below which a dropped part is not a level."""
 NAMED = 6
-"""Velocities that a note lists."""
+"""Most velocities that a note lists."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +54,10 @@ class Segment:
     velocity, torque : float
         Means over the whole revolutions, rad/s and N·m.
     std : float
-        Of the mean torque: from the spread of the revolutions where there are at least 3, else of eight parts of
-        the segment; half the difference of its halves where that is more.
+        Standard deviation of the mean torque: from the spread of the revolutions if there are at least 3, else of eight
+        parts of the segment; half the difference of its halves if that is more.
     revolutions : int
-        Whole revolutions averaged; 0 where the travel was shorter than one.
+        Number of whole revolutions averaged; 0 if the travel was shorter than one.
     travel : float
         Displacement averaged over, rad.
     """
@@ -73,7 +73,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Dropped:
-    """A part of a record at about constant velocity (s, rad/s) that makes no segment, and why."""
+    """A part of a record at nearly constant velocity (s, rad/s) that is not a segment, and the reason."""
 
     start: float
     end: float
@@ -95,14 +95,14 @@ def constant_velocity_segments(
     Parameters
     ----------
     record : Record
-        Channels ``position`` and the torque's; the velocity is the reference's where the record has
+        Channels ``position`` and the torque's; the velocity is the reference's if the record has
         ``velocity_reference``, else the slope of the position (`stickslip.identification.steady_friction.levels`).
     torque : str
         Channel of the torque: motor side or sensor side, one at a time.
     tolerance : float
-        Part by which the velocity may vary within a segment.
+        Relative variation of the velocity allowed within a segment.
     transient : float
-        Displacement dropped at the start of each segment, rad; a fifth of the segment where that is less.
+        Displacement dropped at the start of each segment, rad; a fifth of the segment if that is less.
     revolution : float
         Displacement after which friction repeats, rad (2 pi; a pitch for a linear axis).
     shortest : float
@@ -111,7 +111,7 @@ def constant_velocity_segments(
     Returns
     -------
     tuple of Segment
-        In time's order; `segments_of` says what was left out.
+        In order of time; `segments_of` also returns the parts left out.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def segments_of(
     record: Record, *, torque: str = "motor_torque", tolerance: float = 0.05, transient: float = TRANSIENT,
     revolution: float = REVOLUTION, shortest: float = 0.2,
 ) -> tuple[tuple[Segment, ...], tuple[Dropped, ...]]:  # fmt: skip
-    """The segments of `constant_velocity_segments`, and the parts at constant velocity that make none."""
+    """Return the segments of `constant_velocity_segments`, and the parts at constant velocity that are not segments."""
     if len(record) < 3:
         raise InputError(f"the record has {len(record)} samples; a constant-velocity segment needs many")
     time, position = record.time, record["position"]
@@ -179,9 +179,9 @@ def _averaged(
 
 
 def even_mean(x: Array, y: Array) -> float:
-    """Mean of y over time, every part of x counting alike: the speed may ripple, and the axis stick and slip.
+    """Return the mean of y over time with equal weight for every part of x: for a rippling speed or stick-slip.
 
-    A mean over x itself would count the slips only, and their torque is that of the speed which they reach.
+    A mean over x itself would count only the slips, whose torque belongs to their higher speed.
     """
     parts = min(BINS, x.size // 4)
     travel = float(x[-1] - x[0])
@@ -196,7 +196,7 @@ def even_mean(x: Array, y: Array) -> float:
 def sliding_points(
     records: Record | Sequence[Record], *, torque: str = "motor_torque", **options: Any
 ) -> tuple[SlidingPoints, tuple[str, ...]]:
-    """Points of the sliding curve from records of constant velocities, one side (motor or sensor) at a time.
+    """Return the points of the sliding curve from records of constant velocities, one side (motor or sensor) at a time.
 
     Parameters
     ----------
@@ -204,19 +204,19 @@ def sliding_points(
     torque : str
         Channel: ``motor_torque`` or the sensor's.
     **options
-        Of `constant_velocity_segments`.
+        Options of `constant_velocity_segments`.
 
     Returns
     -------
     points : SlidingPoints
-        Weighted by their standard deviations where every segment has one.
+        Weighted by their standard deviations if every segment has one.
     notes : tuple of str
-        What was averaged, what was dropped and why, and what was less than a revolution.
+        The parts averaged, the parts dropped with the reasons, and those shorter than a revolution.
 
     Raises
     ------
     InputError
-        If no record has a segment; it names those that were dropped.
+        If no record has a segment; the message lists those that were dropped.
     """
     several = [records] if isinstance(records, Record) else list(records)
     segments: list[Segment] = []
@@ -246,7 +246,7 @@ def sliding_points(
 
 
 def _worth_naming(dropped: Dropped, segments: Sequence[Segment]) -> bool:
-    """Whether what was dropped is a level of its own: neither a piece of one that is there, nor creep at rest."""
+    """Return whether a dropped part is a level of its own: neither a piece of another one nor creep at rest."""
     slowest = min((abs(s.velocity) for s in segments), default=0.0)
     piece = any(abs(dropped.velocity - s.velocity) <= SAME * abs(s.velocity) for s in segments)
     return not piece and abs(dropped.velocity) > CREEP * slowest
@@ -255,7 +255,7 @@ def _worth_naming(dropped: Dropped, segments: Sequence[Segment]) -> bool:
 def _standing(
     record: Record, segments: Iterable[Segment]
 ) -> tuple[list[Segment], list[Dropped], list[Segment]]:
-    """The segments that slid; those in which the axis mostly stood; and which of the first stuck and slipped."""
+    """Return the segments that slid, those mostly at rest, and which of the first showed stick-slip."""
     count = encoder_step(record["position"])
     slid: list[Segment] = []
     stood: list[Dropped] = []
@@ -275,10 +275,10 @@ def _standing(
 def _with_systematic_errors(
     record: Record, torque: str, segments: Sequence[Segment], revolution: float
 ) -> list[Segment]:
-    """Add to the standard deviations what the spread within a segment does not show: counts, scale and position.
+    """Add the errors that the spread within a segment does not show: counts, scale and position.
 
-    A segment of less than a revolution sees a part of what depends on the angle. How far the mean over such a part lies
-    from that over all shows in the slowest segment that has a whole revolution, or in the longest.
+    A segment of less than a revolution contains a part of the dependence on the angle. The deviation of such a part's
+    mean from the whole mean is taken from the slowest segment with a whole revolution, or the longest.
     """
     step = encoder_step(record[torque])
     own = step / math.sqrt(12.0 * PARTS)
@@ -303,7 +303,7 @@ def _with_systematic_errors(
 
 
 def _profile(x: Array, y: Array, length: float) -> Array:
-    """Mean of y in equal parts of a length of x, shape (BINS or fewer,)."""
+    """Return the mean of y in equal parts of a length of x, shape (BINS or fewer,)."""
     bins = max(min(BINS, x.size // 4), 1)
     place = np.minimum(bins * x / max(length, 1e-300), bins - 0.5).astype(np.int64)
     inside = x <= length
@@ -313,7 +313,7 @@ def _profile(x: Array, y: Array, length: float) -> Array:
 
 
 def _part_spread(profile: Array, part: float, *, closed: bool) -> float:
-    """Standard deviation of the means over a part of a profile, which is a whole revolution where it is closed."""
+    """Return the standard deviation of the means over a part of a profile; a closed one is a whole revolution."""
     width = max(1, round(part * profile.size))
     if width >= profile.size:
         return 0.0
@@ -323,7 +323,7 @@ def _part_spread(profile: Array, part: float, *, closed: bool) -> float:
 
 
 def _none_found(dropped: Sequence[Dropped]) -> str:
-    """That there is no segment, with what was dropped."""
+    """Return the message that there is no segment, with the dropped parts."""
     said = f"; dropped: {_listed_drops(dropped)}" if dropped else ""
     return (
         f"no segment of constant velocity to average the torque over{said}; record longer ones, or identify the whole "
@@ -334,7 +334,7 @@ def _none_found(dropped: Sequence[Dropped]) -> str:
 def _notes(
     segments: Sequence[Segment], dropped: Sequence[Dropped], stuck: Sequence[Segment], torque: str, *, linear: bool
 ) -> list[str]:  # fmt: skip
-    """What was averaged, dropped, and less than a revolution."""
+    """Return notes on the parts averaged, dropped, and shorter than a revolution."""
     first = "a fifth" if linear else "20 degrees or a fifth, whichever is less,"
     notes = [
         f"{len(segments)} segments of constant velocity from channel {torque!r}, the first {first} of each dropped."
@@ -356,7 +356,7 @@ def _notes(
 
 
 def _listed_drops(dropped: Sequence[Dropped], unit: str = "") -> str:
-    """What was dropped, those for one reason together."""
+    """Return the dropped parts as text, grouped by reason."""
     reasons: dict[str, list[float]] = {}
     for d in dropped:
         reasons.setdefault(d.why, []).append(d.velocity)

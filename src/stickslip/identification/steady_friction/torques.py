@@ -17,11 +17,11 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 
 OFFSET = Par("N·m", "T_0", "constant torque against positive motion")
 SPEEDS = 60
-"""Speeds over the measured range at which the effects of parameters are compared."""
+"""Number of speeds over the measured range at which the effects of parameters are compared."""
 STEP, SAME = 1e-4, 1e-6
-"""Relative step of a derivative; relative residual up to which such derivatives add up to a constant torque."""
+"""Relative step of a derivative; greatest relative residual for such derivatives to add up to a constant torque."""
 PART = 0.1
-"""Part of the largest coefficient in that sum that a parameter must have to be named."""
+"""Least coefficient of a parameter in that sum for it to be named, part of the largest."""
 
 
 class Torques:
@@ -32,7 +32,7 @@ class Torques:
     vector : Vector
         Parameters of a law and ``offset``.
     velocity, side : array, shape (n,)
-        As of `Steady`.
+        As in `Steady`.
     """
 
     def __init__(self, vector: Vector, velocity: Array, side: Array) -> None:
@@ -41,16 +41,16 @@ class Torques:
         self._steady = Steady(vector.base.law, velocity, side)
 
     def at(self, u: Array) -> Array:
-        """Torque at coordinates of the vector, N·m, shape (n,)."""
+        """Return the torque at coordinates of the vector, N·m, shape (n,)."""
         return self._steady.torque(self._vector.packed(u)) + self._vector.named(u)["offset"]
 
     def at_all(self, several: Array) -> Array:
-        """Torque at several coordinates, shape (m, size): N·m, shape (m, n)."""
+        """Return the torque at several coordinates, shape (m, size), N·m, shape (m, n)."""
         offsets = np.array([[self._vector.named(u)["offset"]] for u in several])
         return self._steady.torques(np.array([self._vector.packed(u) for u in several])) + offsets
 
     def at_values(self, values: Array) -> Array:
-        """Torque at values of the free parameters, N·m, shape (n,)."""
+        """Return the torque at values of the free parameters, N·m, shape (n,)."""
         vector = self._vector
         held = next(p for p in vector.parameters if p.name == "offset")
         offset = float(values[vector.names.index("offset")]) if held.free else held.value
@@ -89,10 +89,10 @@ def vector_of(
 
 
 def tied_to_offset(points: SlidingPoints, template: Model, frozen: Iterable[str] = ()) -> tuple[str, ...]:
-    """Return the free parameters of a law whose sum with a constant torque is all that the points determine.
+    """Return the free parameters of a law of which the points determine only the sum with a constant torque.
 
-    At speeds in one direction a constant torque acts as Coulomb friction does; so it does at speeds in both if a law
-    has separate parameters for each direction.
+    At speeds in one direction a constant torque is equivalent to Coulomb friction; at speeds in both directions it is
+    so if a law has separate parameters for each direction.
     """
     moving = np.abs(points.velocity[points.velocity != 0.0])
     if moving.size == 0:
