@@ -23,7 +23,7 @@ AXIS, SINE = ss.RigidAxis(1e-3, LAW), ss.Reference("sine", amplitude=0.1, freque
         (lambda: ss.place("PD", 1e-3, -1.0), "bandwidth = -1 Hz must"),
         (lambda: ss.place("pd", 1e-3, 1.0), "'pd'; did you mean 'PD'?"),
         (lambda: ss.compare(LAW, LAW), "must be a path or what `identify` returned"),
-        (lambda: ss.recommend(LAW, bandwidth=20.0), "must be a path or what `identify` returned"),
+        (lambda: ss.recommend(LAW, bandwidth=20.0), "give inertia in kg·m², or a RigidAxis"),
         (
             lambda: ss.simulate(AXIS, ss.Controller(ss.pd(1.0, 0.1)), SINE, 0.1, initial=1.0),
             "such as (0.0, 0.0), position (rad) and velocity (rad/s)",

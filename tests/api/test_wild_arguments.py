@@ -149,9 +149,12 @@ def calls() -> dict[str, Call]:
         "RecommendationResult": Call(
             ss.RecommendationResult, {"recommendation": bare(Recommendation), "identified": bare(Identified)}
         ),
+        "RecommendationResult.plot": Call(ss.RecommendationResult.plot, {}, (whole,)),
+        "RecommendationResult.report": Call(ss.RecommendationResult.report, {}, (whole,)),
         "RecommendationResult.save": Call(ss.RecommendationResult.save, {}, (whole,)),
         "Record": Call(ss.Record, own(RECORD)),
         "Record.load": Call(ss.Record.load, {"path": "x.npz"}),
+        "Record.plot": Call(RECORD.plot),
         "Record.save": Call(RECORD.save, {"path": "x.npz"}),
         "Reference": Call(ss.Reference, {"kind": "sine", "amplitude": 0.1, "frequency": 1.0}),
         "Reference.breaks": Call(SINE.breaks, {"duration": 1.0}),

@@ -16,6 +16,7 @@ import pytest
 from stickslip import Model
 from stickslip.cli import main
 from stickslip.core.errors import InputError
+from stickslip.core.messages import Surface, render, shown_on
 from stickslip.identification.estimate import Estimate, Identification
 from stickslip.identification.methods.method import Options
 from stickslip.models.plugins import law_names
@@ -326,7 +327,8 @@ def test_what_stays_at_a_laws_default_is_said(capsys: pytest.CaptureFixture[str]
     assert said.startswith("Assumed, not fitted: ")
     assert "delta_s = 2" in said
     assert "alpha = 0.5, 0.5" in said
-    assert "--free NAME" in said
+    with shown_on(Surface.COMMAND_LINE):
+        assert "--free NAME" in render(said)
     given = Options(values={"alpha[0]": 0.5, "alpha[1]": 0.5}, frozen=("delta_s",))
     assert assumptions(found, given, "axis") == []
     assert replace(found, method="inverse dynamics").assumed == {}

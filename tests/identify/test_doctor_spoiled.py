@@ -123,7 +123,7 @@ def test_degrees_under_a_header_that_says_rad_are_doubted(tmp_path, counts, unit
     doubted = [f for f in found.warnings if f.code == "position-unit"]
     assert len(doubted) == (unit == "deg")
     assert found.errors == ()
-    assert all("position=position [rad]:deg" in f.remedy.replace("'", "") for f in doubted)
+    assert all('map={"position": "position [rad]:deg"}' in f.remedy for f in doubted)
 
 
 @pytest.mark.parametrize(
