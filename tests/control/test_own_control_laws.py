@@ -219,7 +219,7 @@ def test_a_bend_at_rest_is_refused_with_what_it_is_and_its_remedy(body, what, bl
 def test_no_torque_at_rest_is_no_linear_loop(block):
     with pytest.raises(LawError, match=r"own.py, line .*ZeroDivisionError"):
         linearised(controller(block("return y.error / y.velocity")), 1e-6, 100.0)
-    with pytest.raises(InputError, match="gives a torque that is no finite number at rest"):
+    with pytest.raises(InputError, match="gives a torque that is not finite at rest"):
         linearised(controller(block("return y.error * math.inf")), 1e-6, 100.0)
 
 
