@@ -231,7 +231,8 @@ def _no_work(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         "verbs.compare.read_identified", "verbs.sweep.execute.run", "verbs.tune.search", "verbs.study.studies.run",
         "verbs.learn._over_time", "verbs.learn._over_angle", "verbs.identification.prepared_folder",
         "verbs.recommendation.prepared_folder", "verbs.learn.prepared_folder", "verbs.export.prepared_folder",
-        "verbs.identification.answers_of", "verbs.sweep.dataset.read", "cli.warm_up.failures", "report.plots.house_style",
+        "verbs.identification.answers_of", "verbs.sweep.dataset.read", "cli.warm_up.failures",
+        "report.plots.house_style",
     ):  # fmt: skip
         monkeypatch.setattr(f"stickslip.{place}", reached)
     monkeypatch.setattr("stickslip.verbs.examiner.examine", lambda record, **_: Diagnosis((), record))

@@ -59,7 +59,7 @@ def own(tmp_path):
 )
 def test_a_name_that_is_taken_in_the_language_is_refused(to, name):
     """`from class import Contact` was in the README of `class.py`."""
-    with pytest.raises(InputError, match=f"name {name}: .* is taken in {to}; give another name"):
+    with pytest.raises(InputError, match=f'name="{name}": .* is taken in {to}; give another name'):
         ss.export(LAW, to=to, name=name)
 
 
@@ -73,7 +73,7 @@ def test_a_files_name_that_is_taken_is_changed_with_a_note(to, stem, tmp_path):
         (tmp_path / f"{name}.toml").write_text(text)
     made = ss.export(tmp_path / f"{stem}.toml", to=to)
     assert made.name == f"{stem}_friction"
-    assert any(f"{stem} is taken in {to}; --name NAME" in note for note in made.notes)
+    assert any(f"{stem} is taken in {to}; name=" in note for note in made.notes)
     free = ss.export(tmp_path / "axis.toml", to=to)
     assert free.name == "axis"
     assert not any("is taken" in note for note in free.notes)
