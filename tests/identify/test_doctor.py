@@ -313,7 +313,7 @@ def test_every_error_may_be_accepted_by_its_code():
     """The codes beside "error", or beside a level that is chosen, in the source; made of a channel's name: not here."""
     root = Path(stickslip.__file__).parent
     codes = set()
-    for file in (*(root / "identify" / "doctor").glob("*.py"), *(root / "readers").glob("*.py")):
+    for file in (*(root / "identification" / "doctor").glob("*.py"), *(root / "readers").glob("*.py")):
         for call in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if (
                 isinstance(call, ast.Call)

@@ -32,7 +32,7 @@ def test_a_gear_is_not_taken_for_degrees(ratio, swing):
     assert found.code == "gravity"
     said = f"{found.message}; {found.remedy}"
     assert ":deg" not in said
-    told = float(found.remedy.split("gear_ratio=")[1].split()[0])
+    told = float(found.remedy.split("gear_ratio=")[1].split()[0].rstrip(","))
     assert told == pytest.approx(ratio, rel=0.05)
 
 

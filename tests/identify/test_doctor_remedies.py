@@ -49,7 +49,7 @@ def test_counts_have_one_remedy_that_asks_for_nothing_given(tmp_path):
     path = in_counts(tmp_path / "log.csv")
     bare = ss.doctor(path).errors
     assert sorted(f.code for f in bare) == ["position-unit", "torque-unit"]
-    assert 'map={"position": "0x6064:counts"}, counts_per_rev=N' in bare[0].remedy
+    assert 'map={"position": "0x6064:counts"} and counts_per_rev=N' in bare[0].remedy
     x = log()
     shares = np.round(1000.0 * x["tau"] / RATED)
     path = written(
@@ -70,7 +70,7 @@ def test_counts_beside_a_velocity_have_one_remedy(tmp_path):
         "r2521": np.round(1e4 * x["q"]),
     }
     (found,) = ss.doctor(written(tmp_path / "log.csv", **columns)).errors
-    assert 'map={"position": "r2521:counts"}, counts_per_rev=N' in found.remedy
+    assert 'map={"position": "r2521:counts"} and counts_per_rev=N' in found.remedy
 
 
 def test_time_that_runs_backwards_has_a_remedy_that_helps(tmp_path):

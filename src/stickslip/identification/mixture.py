@@ -170,7 +170,8 @@ def mix(rows: SlidingRows, fits: Sequence[Fit], asked: Asked) -> Mixture:
     members = [
         m for f, p, r, fam, at in found for m in members_of(f, p, r, fam, at, total, least, asked, factor)
     ]
-    members = [x for m in members for x in with_disturbance(m, bias)]
+    if asked.levels is None or DISTURBANCE.name in asked.levels:
+        members = [x for m in members for x in with_disturbance(m, bias)]
     whole = sum(m.weight for m in members)
     scaled = [replace(m, weight=m.weight / whole) for m in members]
     return Mixture(readout.names, tuple(scaled), speeds, head, posterior, family, place)

@@ -21,7 +21,7 @@ from stickslip.core.messages import name_loop, name_option, name_parameter, rend
 from stickslip.core.record import Record, encoder_step, row_period
 from stickslip.core.reprs import same
 from stickslip.core.spec import Law
-from stickslip.identification.doctor import Diagnosis
+from stickslip.identification.doctor import Diagnosis, of_arrays
 from stickslip.identification.doctor.steady_table import is_steady_table
 from stickslip.identification.estimate import Identification, silent
 from stickslip.identification.evidence import without_inverted_rest
@@ -205,6 +205,7 @@ def identify(
     with units_of_axis(all(is_linear(r) for r in records)):
         found = identified(kind, sources, options)
     found = with_notes(found, kind, records, options, left_out)
+    sources = [replace(s, findings=[f.rendered(of_arrays(s.record)) for f in s.findings]) for s in sources]
     found = replace(found, findings=tuple(f for s in sources for f in s.findings))
     return IdentificationResult(found, tuple(sources), law_file(found, () if inverse else laws))
 

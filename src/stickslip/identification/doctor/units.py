@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from stickslip.core.finding import Finding
+from stickslip.core.messages import name_option
 from stickslip.identification.doctor.view import Array, View
 
 DEG, REV, RPM = math.pi / 180.0, 2.0 * math.pi, 2.0 * math.pi / 60.0
@@ -91,7 +92,7 @@ def in_counts(view: View) -> bool:
 def _more(view: View, number: str, value: str) -> str:
     """Return the option of a drive parameter, unless it is given."""
     given = view.record.meta.get("reading", {}).get("drive", {})
-    return "" if number in given else f" --{number.replace('_', '-')} {value}"
+    return "" if number in given else f" and {name_option(number, value)}"
 
 
 def degrees(view: View) -> Iterator[Finding]:
