@@ -186,10 +186,10 @@ MAKERS: dict[str, Callable[..., str]] = {
     name: f for name, f in vars(messages).items() if name.startswith(("name_", "ask_for_"))
 }
 CODE = re.compile(r"`[^`]*`")
-NOT_MESSAGES = ("cli", "messages.py")
+NOT_MESSAGES = ("cli", "core/messages.py")
 """What is written for the command line alone, and what writes the references."""
 COMMANDS = {
-    "report/next_steps.py", "report/after_a_map.py",  # commands to copy, next to the same in Python
+    "report/next_steps.py", "report/after_a_map.py", "report/recommended.py",  # commands to copy
     "exports/arduino.py", "exports/linuxcnc.py", "exports/matlab.py", "web/jobs.py",  # of other programs
     "web/worker.py",  # of other programs
     "web/server.py",  # said in the terminal before there is a page

@@ -152,7 +152,7 @@ class Record:
         InputError
             If there is no such file, or it is not a record.
         """
-        from stickslip.core import _stream_file as stream
+        from stickslip.core import stream_file as stream
         from stickslip.core.config import refuse_endless
 
         refuse_endless(Path(path))

@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from stickslip.core._stream_file import MAGIC, StreamFile, contents, rows_since
 from stickslip.core.errors import InputError, RecordFault
 from stickslip.core.record import Record
+from stickslip.core.stream_file import MAGIC, StreamFile, contents, rows_since
 
 __all__ = ["EXTENT", "MAGIC", "PERIOD", "Stream", "rows_since"]
 

@@ -6,9 +6,9 @@ import zipfile
 from pathlib import Path
 from typing import cast
 
-from stickslip.core._stream_file import MAGIC
 from stickslip.core.errors import InputError
 from stickslip.core.record import Record
+from stickslip.core.stream_file import MAGIC
 from stickslip.readers.numpy_arrays import insist_on_arrays
 from stickslip.readers.table_columns import Column, Format, Table
 
