@@ -164,6 +164,13 @@ def test_the_exponent_of_the_fall_is_that_of_the_record(logs: Any, power: float)
     assert wrong(found, log.truth) == {}
 
 
+def test_both_directions_have_the_exponent_of_the_record(logs: Any) -> None:
+    log = logs.draw(811, "held", 1000, "p-pi", "staircase", "clean", exponent=1.0)
+    found = identify_axis([experiment(log)], AXIS, ["stribeck"], per_direction=True)
+    assert found.model is not None
+    assert found.model.parameters.delta_s == found.model.parameters.delta_s_negative == 1.0
+
+
 def test_a_stated_exponent_is_kept(logs: Any) -> None:
     log = logs.draw(811, "held", 1000, "p-pi", "staircase", "clean", exponent=1.0)
     found = identify_axis([experiment(log)], AXIS, ["stribeck"], frozen=["delta_s"], values={"delta_s": 2.0})

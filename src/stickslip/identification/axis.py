@@ -61,6 +61,7 @@ from stickslip.identification.regression.inverse import InverseDynamics, inverse
 from stickslip.identification.search import Asked as SlidingAsked
 from stickslip.identification.sliding import SlidingPosterior, estimate_sliding
 from stickslip.identification.slow_motion import (
+    EXPONENT_NAMES,
     Evidence,
     LawFit,
     correlation_of,
@@ -282,14 +283,16 @@ def hold_likeliest_exponent(asked: Asked, laws: Sequence[Law], sliding: SlidingP
     """Hold the exponent of friction's fall if no law and no user fixes it, to compare all laws with the same one."""
     for law in laws:
         if exponents := exponents_open(asked, law, sliding):
-            return replace(asked, values={**asked.values, "delta_s": next(iter(exponents))})
+            likeliest = next(iter(exponents))
+            own = {n: likeliest for n in EXPONENT_NAMES if any(f.name == n for f in law.fields)}
+            return replace(asked, values={**asked.values, **own})
     return asked
 
 
 def exponents_open(asked: Asked, law: Law, sliding: SlidingPosterior | None) -> dict[float, float]:
     """Return the exponents of a law's fall with their probabilities from sliding; none if law or user fixes it."""
     has = any(f.name == "delta_s" for f in law.fields)
-    if sliding is None or not has or "delta_s" in (*asked.free, *asked.values):
+    if sliding is None or not has or {*EXPONENT_NAMES} & {*asked.free, *asked.values}:
         return {}
     return sliding.exponents
 

@@ -173,6 +173,8 @@ class LawFit:
         return correlation_of(change @ self.covariance @ change.T)
 
 
+EXPONENT_NAMES = ("delta_s", f"delta_s{NEGATIVE}")
+"""Exponents of friction's fall, also of a law with parameters for each direction."""
 DETERMINED = math.log(2.0) / (2.0 * QUANTILE)
 """Standard deviation of a logarithm whose 95 % interval spans a factor of two: the limit of identified."""
 TAKES_PART = 0.3
@@ -352,19 +354,28 @@ def fit_law(
     """
     if not exponents:
         return fit_minimum(evidence, law, asked, start or {}).law_fit
-    minima = list[Minimum]()
-    for exponent in exponents:
-        values = {**(start or {}), "delta_s": exponent}
-        minima.append(fit_minimum(evidence.given_exponent(exponent), law, asked, values))
-        start = minima[0].law_fit.model.parameters._asdict()
-    first, best = minima[0], min(minima, key=minima[0].cost_of)
+    likeliest, *others = exponents
+
+    def fit(exponent: float, values: Mapping[str, Any]) -> Minimum:
+        own = {**values, **{n: exponent for n in EXPONENT_NAMES if n in names}}
+        return fit_minimum(evidence.given_exponent(exponent), law, asked, own)
+
+    names = {f.name for f in law.fields}
+    first = fit(likeliest, start or {})
+    minima, weights = [first], [exponents[likeliest]]
+    for exponent in others:
+        try:
+            minima.append(fit(exponent, first.law_fit.model.parameters._asdict()))
+        except InputError:
+            # No simulation with this exponent succeeds.
+            continue
+        weights.append(exponents[exponent])
+    best = min(minima, key=first.cost_of)
     if best is not first:
         # The search is local: the minimum with another exponent may be a better start for this one.
-        likeliest = next(iter(exponents))
-        values = {**best.law_fit.model.parameters._asdict(), "delta_s": likeliest}
-        again = fit_minimum(evidence.given_exponent(likeliest), law, asked, values)
+        again = fit(likeliest, best.law_fit.model.parameters._asdict())
         minima[0] = min(first, again, key=first.cost_of)
-    return mix_minima(minima, list(exponents.values()))
+    return mix_minima(minima, weights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -391,7 +402,8 @@ class Minimum:
 
     def cost_of(self, other: Minimum) -> float:
         """Return the sum of squares of another minimum under this one's weights."""
-        return float(np.sum(self.squares_of(other))) + self.prior_of(other)
+        cost = float(np.sum(self.squares_of(other))) + self.prior_of(other)
+        return cost if math.isfinite(cost) else math.inf
 
     def log_odds(self, other: Minimum, prior: float) -> float:
         """Return the log odds of another minimum against this one, after `prior` log odds.
@@ -399,6 +411,8 @@ class Minimum:
         The uncertainty of the difference of both log likelihoods follows from its scatter over segments of time (Vuong
         1989); the odds are averaged over it (MacKay 1992).
         """
+        if math.isinf(self.cost_of(other)):
+            return -math.inf
         apart = 0.5 * (self.squares_of(self) - self.squares_of(other))
         segments = np.bincount(self.criterion.blocks(BLOCK), apart)
         variance = segments.size * float(np.var(segments, ddof=1))
