@@ -10,10 +10,10 @@ import pytest
 
 from stickslip.control.controller import Controller
 from stickslip.control.linear import pd, pid
-from stickslip.core._stream_file import rows_since
 from stickslip.core.errors import InputError, LimitCrossed, MeasurementFault, RigError
 from stickslip.core.record import Record
 from stickslip.core.stream import Stream
+from stickslip.core.stream_file import rows_since
 from stickslip.rigs.files import read_rig
 from stickslip.rigs.loop import Loop
 from stickslip.rigs.rig import Limits, Measurement, setpoints
